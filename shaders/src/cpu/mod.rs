@@ -1,0 +1,1 @@
+//! The CPU mirrors, in the order in which data flows.
