@@ -1,1 +1,4 @@
 //! Metrics, comparison methods and benchmarks.
+
+pub mod glb;
+pub mod cornell;
