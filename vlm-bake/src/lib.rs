@@ -4,3 +4,4 @@
 //! `scene -> patches -> decimate -> offset -> refine -> verify -> tag -> samples -> grid -> write`.
 
 pub mod scene;
+pub mod bvh;
