@@ -1,1 +1,5 @@
 //! Metrics, comparison methods and benchmarks.
+
+pub mod glb;
+pub mod cornell;
+pub mod assets;
