@@ -41,7 +41,7 @@ pub fn quad(corner: Vec3, u: Vec3, v: Vec3, cells: u32) -> Mesh {
 }
 
 /// The inside of a sphere: an octahedron whose triangles are split in four `levels` times, pushed onto the sphere.
-/// With 4 levels (2,048 triangles) facets lie up to 0.33 % of the radius inside of it.
+/// With 4 levels (2,048 triangles) facets lie up to 0.4 % of the radius inside of it.
 #[must_use]
 pub fn inward_sphere(centre: Vec3, radius: f32, levels: u32) -> Mesh {
     let mut corners: Vec<[Vec3; 3]> = Vec::new();
