@@ -1,1 +1,3 @@
 //! Metrics, comparison methods and benchmarks.
+
+pub mod assets;

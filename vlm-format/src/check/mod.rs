@@ -1,0 +1,76 @@
+//! Checks of a glTF file's JSON and of the bytes it refers to, before anything follows its indices.
+//!
+//! `shape` compares types and indices with tables, `rules` checks what tables cannot say (hierarchy, extensions),
+//! `layout` compares offsets and counts with the bytes that are there.
+
+mod shape;
+pub(crate) mod rules;
+pub(crate) mod layout;
+
+use serde_json::Value;
+
+use crate::error::{Code, Issue, Severity};
+
+/// More problems than this say nothing new, and a hostile file could list millions.
+const MAX_ISSUES: usize = 1000;
+
+/// The problems found so far.
+#[derive(Debug, Default)]
+pub(crate) struct Report {
+    issues: Vec<Issue>,
+}
+
+impl Report {
+    fn push(&mut self, issue: Issue) {
+        if self.issues.len() < MAX_ISSUES {
+            self.issues.push(issue);
+        }
+    }
+
+    fn error(&mut self, code: Code, pointer: impl Into<String>, message: impl Into<String>) {
+        self.push(Issue::error(code, pointer, message));
+    }
+
+    fn warning(&mut self, code: Code, pointer: impl Into<String>, message: impl Into<String>) {
+        self.push(Issue::warning(code, pointer, message));
+    }
+
+    /// True if the file has to be refused.
+    pub(crate) fn has_errors(&self) -> bool {
+        self.issues.iter().any(|issue| issue.severity == Severity::Error)
+    }
+
+    /// All problems, in the order in which they were found.
+    pub(crate) fn into_issues(self) -> Vec<Issue> {
+        self.issues
+    }
+}
+
+/// Checks all that the JSON alone can tell. Each stage relies on the ones before it.
+pub(crate) fn check_json(root: &Value) -> Report {
+    let mut report = Report::default();
+    let stages: [fn(&Value, &mut Report); 4] =
+        [rules::version, rules::extensions, shape::check, rules::structure];
+    for stage in stages {
+        stage(root, &mut report);
+        if report.has_errors() {
+            break;
+        }
+    }
+    report
+}
+
+/// The elements of a root array; none if it is absent.
+pub(crate) fn array<'a>(root: &'a Value, pointer: &str) -> &'a [Value] {
+    root.pointer(pointer).and_then(Value::as_array).map_or(&[], Vec::as_slice)
+}
+
+/// A whole number property; `None` if absent or of another type.
+pub(crate) fn count(value: &Value, key: &str) -> Option<u64> {
+    value.get(key).and_then(Value::as_u64)
+}
+
+/// An index property; `None` if absent.
+pub(crate) fn index(value: &Value, key: &str) -> Option<usize> {
+    count(value, key).and_then(|index| usize::try_from(index).ok())
+}

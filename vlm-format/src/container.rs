@@ -1,0 +1,238 @@
+//! A glTF file in memory: JSON as it was written, its buffers, and a typed view that is safe to walk.
+
+use std::borrow::Cow;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use serde_json::Value;
+
+use crate::check::{self, array, count, index, layout};
+use crate::codec;
+use crate::error::{Code, Error, Issue};
+use crate::glb;
+use crate::typed;
+use crate::uri;
+
+/// How the file was packed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// One binary file (.glb).
+    Glb,
+    /// JSON (.gltf), with its data in data URIs or files beside it.
+    Gltf,
+}
+
+/// A checked glTF file with all its buffers in memory.
+#[derive(Debug)]
+pub struct GltfFile {
+    name: String,
+    folder: Option<PathBuf>,
+    kind: Kind,
+    json: Value,
+    document: gltf::Document,
+    buffers: Vec<Vec<u8>>,
+    /// Chunks of the GLB beyond JSON and BIN.
+    other_chunks: Vec<(u32, Vec<u8>)>,
+    /// Compressed buffer views, decoded when first asked for.
+    decoded: Vec<OnceLock<Result<Vec<u8>, Issue>>>,
+    warnings: Vec<Issue>,
+}
+
+impl GltfFile {
+    /// Reads a .glb or .gltf file; its content decides which it is, not its name.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the file cannot be read, [`Error::Invalid`] with every problem found if it cannot be relied on.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let io = |source| Error::Io { path: path.to_owned(), action: "read", source };
+        let bytes = fs::read(path).map_err(io)?;
+        Self::from_slice(&bytes, &path.display().to_string(), path.parent())
+    }
+
+    /// Reads the bytes of a .glb or .gltf file. `name` is for messages. `folder` is where files beside it lie; without
+    /// one (a pipe), all data must be inside.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with every problem found if the file cannot be relied on.
+    pub fn from_slice(bytes: &[u8], name: &str, folder: Option<&Path>) -> Result<Self, Error> {
+        let refuse = |issue: Issue| issue.in_file(name);
+        let packed = unpack(bytes).map_err(refuse)?;
+        let mut json = check::check_json(&packed.json);
+        if json.has_errors() {
+            return Err(Error::Invalid { file: name.to_owned(), issues: json.into_issues() });
+        }
+        let buffers = load_buffers(&packed.json, packed.bin, folder).map_err(refuse)?;
+        layout::check(&packed.json, &usable_bytes(&packed.json, &buffers), &mut json);
+        if json.has_errors() {
+            return Err(Error::Invalid { file: name.to_owned(), issues: json.into_issues() });
+        }
+        let document = typed::document(&packed.json).map_err(refuse)?;
+        Ok(Self {
+            name: name.to_owned(),
+            folder: folder.map(Path::to_owned),
+            kind: packed.kind,
+            document,
+            buffers,
+            other_chunks: packed.others,
+            decoded: array(&packed.json, "/bufferViews").iter().map(|_| OnceLock::new()).collect(),
+            json: packed.json,
+            warnings: json.into_issues(),
+        })
+    }
+
+    /// The name for messages, as the caller gave it.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// How the file was packed.
+    pub fn kind(&self) -> &Kind {
+        &self.kind
+    }
+
+    /// The JSON as it was read: key order, unknown extensions and extras included.
+    pub fn json(&self) -> &Value {
+        &self.json
+    }
+
+    /// The typed view of the JSON. Every index in it leads somewhere and the nodes are a forest, so it may be walked
+    /// freely, with these exceptions: animations are left out; a texture without a readable source has none; the
+    /// bytes of images are to be had from [`Self::image_bytes`], and those of accessors from the `read_` methods.
+    pub fn document(&self) -> &gltf::Document {
+        &self.document
+    }
+
+    /// Problems that can be lived with.
+    pub fn warnings(&self) -> &[Issue] {
+        &self.warnings
+    }
+
+    /// The encoded bytes of an image (PNG, JPEG, WebP, whatever the file holds).
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the image does not exist or its file cannot be read.
+    pub fn image_bytes(&self, image: usize) -> Result<Cow<'_, [u8]>, Error> {
+        let pointer = format!("/images/{image}");
+        let json = array(&self.json, "/images").get(image).unwrap_or(&Value::Null);
+        let uri = json.get("uri").and_then(Value::as_str);
+        let bytes = match (index(json, "bufferView"), uri) {
+            (Some(view), _) => self.view_bytes(view).map(Cow::Borrowed),
+            (None, Some(uri)) => {
+                uri::load(uri, self.folder.as_deref(), &format!("{pointer}/uri")).map(Cow::Owned)
+            }
+            (None, None) => {
+                Err(Issue::error(Code::ImageMissing, pointer, "the image has neither uri nor bufferView"))
+            }
+        };
+        bytes.map_err(|issue| issue.in_file(&self.name))
+    }
+
+    /// The files beside this one that it refers to (buffers, then images), for watchers and caches. They need not exist.
+    pub fn external_files(&self) -> Vec<PathBuf> {
+        let folder = self.folder.as_deref().unwrap_or(Path::new(""));
+        self.external_uris().map(|(_, path)| folder.join(path)).collect()
+    }
+
+    /// URI and relative path of every file beside this one.
+    pub(crate) fn external_uris(&self) -> impl Iterator<Item = (&str, PathBuf)> {
+        let items = array(&self.json, "/buffers").iter().chain(array(&self.json, "/images"));
+        items.filter_map(|item| {
+            let uri = item.get("uri")?.as_str()?;
+            match uri::locate(uri, "") {
+                Ok(uri::Location::Relative(path)) => Some((uri, path)),
+                _ => None,
+            }
+        })
+    }
+
+    /// The bytes of a buffer view, decompressed where it is compressed.
+    pub(crate) fn view_bytes(&self, view: usize) -> Result<&[u8], Issue> {
+        let pointer = || format!("/bufferViews/{view}");
+        let json = array(&self.json, "/bufferViews").get(view).ok_or_else(|| {
+            Issue::error(Code::IndexOutOfRange, "/bufferViews", format!("there is no buffer view {view}"))
+        })?;
+        let Some((extension, source)) = layout::meshopt(json) else {
+            return self.range(json).ok_or_else(|| cut_off(pointer()));
+        };
+        let decode = || {
+            let pointer = format!("{}/extensions/{extension}", pointer());
+            let encoded = self.range(source).ok_or_else(|| cut_off(pointer.clone()))?;
+            codec::decode(source, encoded, &pointer)
+        };
+        let slot = self.decoded.get(view).ok_or_else(|| cut_off(pointer()))?;
+        slot.get_or_init(decode).as_deref().map_err(Clone::clone)
+    }
+
+    /// The bytes that `buffer`, `byteOffset` and `byteLength` name.
+    fn range(&self, json: &Value) -> Option<&[u8]> {
+        let start = usize::try_from(count(json, "byteOffset").unwrap_or_default()).ok()?;
+        let length = usize::try_from(count(json, "byteLength")?).ok()?;
+        self.buffers.get(index(json, "buffer")?)?.get(start..start.checked_add(length)?)
+    }
+}
+
+fn cut_off(pointer: String) -> Issue {
+    Issue::error(Code::ViewOutOfRange, pointer, "the data is cut off")
+}
+
+/// The parts of a file, before any check.
+struct Unpacked<'a> {
+    kind: Kind,
+    json: Value,
+    bin: Option<&'a [u8]>,
+    others: Vec<(u32, Vec<u8>)>,
+}
+
+fn unpack(bytes: &[u8]) -> Result<Unpacked<'_>, Issue> {
+    if glb::is_glb(bytes) {
+        let glb = glb::parse(bytes)?;
+        let others = glb.others.into_iter().map(|(kind, data)| (kind, data.to_vec())).collect();
+        return Ok(Unpacked { kind: Kind::Glb, json: parse_json(glb.json)?, bin: glb.bin, others });
+    }
+    let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    if text.trim_ascii_start().first() != Some(&b'{') {
+        return Err(Issue::error(Code::NotGltf, "", "the file is neither GLB nor JSON"));
+    }
+    Ok(Unpacked { kind: Kind::Gltf, json: parse_json(text)?, bin: None, others: Vec::new() })
+}
+
+fn parse_json(bytes: &[u8]) -> Result<Value, Issue> {
+    // Some writers pad the JSON chunk with zeros where the specification asks for spaces.
+    let end = bytes.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
+    serde_json::from_slice(&bytes[..end])
+        .map_err(|error| Issue::error(Code::JsonSyntax, "", format!("the JSON cannot be parsed: {error}")))
+}
+
+fn load_buffers(json: &Value, bin: Option<&[u8]>, folder: Option<&Path>) -> Result<Vec<Vec<u8>>, Issue> {
+    let mut buffers = Vec::new();
+    for (i, buffer) in array(json, "/buffers").iter().enumerate() {
+        let pointer = format!("/buffers/{i}");
+        let data = match buffer.get("uri").and_then(Value::as_str) {
+            Some(uri) => uri::load(uri, folder, &format!("{pointer}/uri"))?,
+            None if i == 0 => bin.unwrap_or_default().to_vec(),
+            None => Vec::new(),
+        };
+        let promised = count(buffer, "byteLength").unwrap_or_default();
+        if (data.len() as u64) < promised && !is_fallback(buffer) {
+            let message = format!("the buffer has {} bytes of the {promised} that it promises", data.len());
+            return Err(Issue::error(Code::BufferShort, pointer, message));
+        }
+        buffers.push(data);
+    }
+    Ok(buffers)
+}
+
+/// True for a buffer that stands for decompressed data and need not have any of its own.
+fn is_fallback(buffer: &Value) -> bool {
+    ["EXT_meshopt_compression", "KHR_meshopt_compression"]
+        .into_iter()
+        .any(|name| buffer.pointer(&format!("/extensions/{name}/fallback")) == Some(&Value::Bool(true)))
+}
+
+/// How many bytes of each buffer may be referred to: what it promises, as far as it is there.
+fn usable_bytes(json: &Value, buffers: &[Vec<u8>]) -> Vec<u64> {
+    let promised =
+        array(json, "/buffers").iter().map(|buffer| count(buffer, "byteLength").unwrap_or_default());
+    promised.zip(buffers).map(|(promised, data)| promised.min(data.len() as u64)).collect()
+}
