@@ -183,7 +183,7 @@ impl AuthoredLights<'_> {
                 let surface_corners =
                     self.scene.triangles[triangle as usize].map(|v| self.scene.positions[v as usize].as_dvec3());
                 let barycentric = barycentric(surface_corners, position.as_dvec3()).as_vec3();
-                let surface = self.scene.albedo_at(triangle, barycentric, area as f32);
+                let surface = self.scene.albedo_at(triangle as usize, barycentric, area as f32);
                 let point = SurfacePoint {
                     position: position.as_dvec3(),
                     normal: self.visible.normals[triangle as usize].as_dvec3(),
@@ -192,7 +192,7 @@ impl AuthoredLights<'_> {
                     area,
                     back: false,
                 };
-                (point, surface.albedo * surface.coverage)
+                (point, surface.reflectance())
             })
             .collect()
     }

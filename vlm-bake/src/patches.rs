@@ -89,7 +89,7 @@ fn makes_lights(scene: &Scene, triangle: usize, surface: &Surface) -> bool {
     let primitive = &scene.primitives[scene.triangle_primitive[triangle] as usize];
     let material = &scene.materials[primitive.material as usize];
     let steering = &scene.objects[primitive.object as usize].steering;
-    let bright = (surface.albedo * surface.coverage).max_element() > BLACK && material.reflects;
+    let bright = surface.reflectance().max_element() > BLACK && material.reflects;
     !steering.exclude && (bright || surface.emission.max_element() > 0.0)
 }
 
@@ -174,7 +174,7 @@ fn group(patches: &mut Patches, scene: &Scene, surfaces: &[Surface], least_area:
 
 /// How far apart two mean surfaces look; infinite between an emitter and anything unlike it.
 fn step(a: &Surface, b: &Surface) -> f32 {
-    let root = |s: &Surface| Vec3::from_array((s.albedo * s.coverage).max(Vec3::ZERO).to_array().map(f32::sqrt));
+    let root = |s: &Surface| Vec3::from_array(s.reflectance().max(Vec3::ZERO).to_array().map(f32::sqrt));
     let emission = (a.emission - b.emission).abs().max_element();
     if emission > 0.1 * a.emission.max(b.emission).max_element() {
         return f32::INFINITY;

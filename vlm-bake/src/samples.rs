@@ -119,8 +119,8 @@ fn candidates<'a>(sources: &Sources<'a>, face: usize) -> Vec<Candidate<'a>> {
     let of = |&p: &u32| {
         let point = &sources.points[p as usize];
         let triangle = sources.patches.triangle_source[point.triangle as usize];
-        let surface = sources.scene.albedo_at(triangle, point.barycentric, point.area as f32);
-        Candidate { point, albedo: surface.albedo * surface.coverage, emission: surface.emission * PI }
+        let surface = sources.scene.albedo_at(triangle as usize, point.barycentric, point.area as f32);
+        Candidate { point, albedo: surface.reflectance(), emission: surface.emission * PI }
     };
     sources.standing.of(face).iter().map(of).collect()
 }
