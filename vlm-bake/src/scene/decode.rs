@@ -2,7 +2,7 @@
 
 use super::LoadOptions;
 use super::material::TextureRequest;
-use super::texture::{Sampling, Texture};
+use super::texture::Texture;
 use image::{ImageReader, Limits, RgbaImage};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -69,11 +69,4 @@ fn build(pixels: &RgbaImage, requests: &[TextureRequest], numbers: &[usize], opt
         Some(texture.at_most(options.max_texture_side))
     };
     numbers.iter().map(|&number| requests.get(number).and_then(build_one)).collect()
-}
-
-impl Texture {
-    fn white() -> Self {
-        let texels = vec![[255; 4]];
-        Self::from_srgb8([1, 1], texels, Sampling::default(), None).unwrap_or_default()
-    }
 }

@@ -88,6 +88,21 @@ impl Texture {
         Some(Self { levels, sampling, masked: mask.is_some() })
     }
 
+    /// One white texel.
+    #[must_use]
+    pub fn white() -> Self {
+        let level = Level { width: 1, height: 1, texels: Texels::Srgb8(vec![[255; 4]]) };
+        Self { levels: vec![level], sampling: Sampling::default(), masked: false }
+    }
+
+    /// Without the levels that are wider or higher than `side` texels; one level always stays.
+    #[must_use]
+    pub fn at_most(mut self, side: u32) -> Self {
+        let large = self.levels.iter().take_while(|level| level.width.max(level.height) > side).count();
+        self.levels.drain(..large.min(self.levels.len() - 1));
+        self
+    }
+
     /// Width and height of level 0 in texels.
     #[must_use]
     pub fn size(&self) -> [u32; 2] {
@@ -123,33 +138,41 @@ impl Texture {
     fn bilinear(&self, uv: Vec2, level: usize) -> Vec4 {
         let Some(texels) = self.levels.get(level) else { return Vec4::ONE };
         let [wrap_u, wrap_v] = self.sampling.wrap;
-        let x = uv.x * texels.width as f32;
-        let y = uv.y * texels.height as f32;
         if self.sampling.nearest && level == 0 {
-            return texels.get(wrap_u.apply(x.floor(), texels.width), wrap_v.apply(y.floor(), texels.height));
+            return texels.get(wrap_u.nearest(uv.x, texels.width), wrap_v.nearest(uv.y, texels.height));
         }
-        let (x, y) = (x - 0.5, y - 0.5);
-        let (left, top) = (x.floor(), y.floor());
-        let columns = [left, left + 1.0].map(|c| wrap_u.apply(c, texels.width));
-        let rows = [top, top + 1.0].map(|r| wrap_v.apply(r, texels.height));
-        let row = |r: u32| texels.get(columns[0], r).lerp(texels.get(columns[1], r), x - left);
-        row(rows[0]).lerp(row(rows[1]), y - top)
+        let ([left, right], blend_x) = wrap_u.neighbours(uv.x, texels.width);
+        let ([top, bottom], blend_y) = wrap_v.neighbours(uv.y, texels.height);
+        let row = |y: u32| texels.get(left, y).lerp(texels.get(right, y), blend_x);
+        row(top).lerp(row(bottom), blend_y)
     }
 }
 
 impl Wrap {
-    /// The texel that stands for a whole-numbered coordinate; `size` above 0.
-    fn apply(self, coordinate: f32, size: u32) -> u32 {
-        let (i, size) = (coordinate as i64, i64::from(size));
-        let wrapped = match self {
-            Self::Repeat => i.rem_euclid(size),
-            Self::Clamp => i.clamp(0, size - 1),
-            Self::Mirror => {
-                let m = i.rem_euclid(2 * size);
-                m.min(2 * size - 1 - m)
-            }
-        };
-        wrapped as u32
+    /// The coordinate's place within the image, 0 to 1.
+    fn inside(self, coordinate: f32) -> f32 {
+        match self {
+            Self::Repeat => coordinate - coordinate.floor(),
+            Self::Clamp => coordinate.clamp(0.0, 1.0),
+            Self::Mirror => 1.0 - (coordinate - 2.0 * (0.5 * coordinate).floor() - 1.0).abs(),
+        }
+    }
+
+    /// The texel that holds a coordinate, of a row of `size`.
+    fn nearest(self, coordinate: f32, size: u32) -> u32 {
+        ((self.inside(coordinate) * size as f32) as u32).min(size - 1)
+    }
+
+    /// The two texels whose centres a coordinate lies between, and how far it is on the way from one to the other.
+    fn neighbours(self, coordinate: f32, size: u32) -> ([u32; 2], f32) {
+        let x = self.inside(coordinate) * size as f32 - 0.5;
+        let first = x.floor();
+        let last = size - 1;
+        // Beyond the border lies the other end of a tile, but the border itself of a mirror.
+        let (before, beyond) = if self == Self::Repeat { (last, 0) } else { (0, last) };
+        let left = if first < 0.0 { before } else { (first as u32).min(last) };
+        let right = if first + 1.0 > last as f32 { beyond } else { (first + 1.0) as u32 };
+        ([left, right], x - first)
     }
 }
 
