@@ -3,3 +3,6 @@
 pub mod assets;
 pub mod glb;
 pub mod cornell;
+pub mod scenes;
+pub mod metrics;
+pub mod thesis;
