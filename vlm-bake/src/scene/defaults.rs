@@ -15,7 +15,8 @@ const RAYS: usize = 128;
 /// Places along each axis of the box around the scene that the survey casts rays from.
 const PLACES: [f32; 3] = [0.25, 0.5, 0.75];
 
-/// A place is inside a room if at least this share of its rays meets fronts; some windows stay possible.
+/// A place is inside a room if at least this share of its rays meets fronts; some windows stay possible. A scene is a
+/// room if most of its places are that are not inside something solid.
 const ROOM_SHARE: f32 = 0.95;
 
 /// A box is open to one side if escaping rays average to a vector at least this long. Half a sphere of them has 0.5.
@@ -102,8 +103,10 @@ impl Scene {
         let place = |x: f32, y: f32, z: f32| minimum + Vec3::new(x, y, z) * (maximum - minimum);
         let survey = |origin| Survey::from(&bvh, origin, (maximum - minimum).length());
         let places = PLACES.iter().flat_map(|&x| PLACES.iter().flat_map(move |&y| PLACES.iter().map(move |&z| (x, y, z))));
-        let rooms = places.map(|(x, y, z)| survey(place(x, y, z))).filter(|s| s.fronts >= ROOM_SHARE);
-        if let Some(best) = rooms.reduce(|a, b| if b.distance > a.distance { b } else { a }) {
+        let free: Vec<Survey> = places.map(|(x, y, z)| survey(place(x, y, z))).filter(|s| s.backs < 0.5).collect();
+        let rooms = || free.iter().filter(|s| s.fronts >= ROOM_SHARE);
+        let best = rooms().reduce(|a, b| if b.distance > a.distance { b } else { a });
+        if let (Some(best), true) = (best, 2 * rooms().count() > free.len()) {
             return Setting::Room { centre: best.origin, sight: best.sight, radius: best.distance };
         }
         let middle = survey(place(0.5, 0.5, 0.5));
@@ -179,6 +182,8 @@ struct Survey {
     origin: Vec3,
     /// Share of the rays that meet the front of something.
     fronts: f32,
+    /// Share of the rays that meet the back of something.
+    backs: f32,
     /// Mean distance to what is met, metres.
     distance: f32,
     /// Mean direction of the rays that meet nothing.
@@ -212,6 +217,7 @@ impl Survey {
         Self {
             origin,
             fronts: fronts / RAYS as f32,
+            backs: (hits - fronts) / RAYS as f32,
             distance: distance / hits.max(1.0),
             escape: escape / escaped.max(1.0),
             sight: sight.with_y(0.0).normalize_or(Vec3::NEG_Z),
