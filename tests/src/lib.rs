@@ -1,5 +1,8 @@
 //! Metrics, comparison methods and benchmarks.
 
-pub mod assets;
 pub mod glb;
 pub mod cornell;
+pub mod assets;
+pub mod scenes;
+pub mod metrics;
+pub mod thesis;

@@ -107,7 +107,7 @@ fn inside(bvh: &Bvh, p: Vec3) -> bool {
     let direction = Vec3::new(0.267_261, 0.534_522, 0.801_784);
     let mut crossings = std::collections::BTreeSet::new();
     while bvh
-        .hit_where(p, direction, f32::INFINITY, |t, _| !crossings.contains(&t))
+        .hit_where(p, direction, f32::INFINITY, |hit| !crossings.contains(&hit.triangle))
         .is_some_and(|hit| crossings.insert(hit.triangle))
     {}
     crossings.len() % 2 == 1

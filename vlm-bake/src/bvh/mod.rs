@@ -95,17 +95,18 @@ impl Bvh {
     /// The nearest hit nearer than `max_distance` (in multiples of `direction`).
     #[must_use]
     pub fn hit(&self, origin: Vec3, direction: Vec3, max_distance: f32) -> Option<Hit> {
-        self.hit_where(origin, direction, max_distance, |_, _| true)
+        self.hit_where(origin, direction, max_distance, |_| true)
     }
 
-    /// The nearest hit among the triangles that `accept(triangle, front)` lets through.
+    /// The nearest hit among those that `accept` lets through. `accept` is asked only about hits that would be the
+    /// nearest so far.
     #[must_use]
     pub fn hit_where(
         &self,
         origin: Vec3,
         direction: Vec3,
         max_distance: f32,
-        accept: impl Fn(u32, bool) -> bool,
+        accept: impl Fn(&Hit) -> bool,
     ) -> Option<Hit> {
         let ray = ray(origin, direction, max_distance)?;
         let mut best: Option<Hit> = None;
@@ -113,7 +114,7 @@ impl Bvh {
             self.tree.ray_traverse_dynamic(&mut stack, ray, &mut RayHit::none(), |node, ray, _| {
                 for slot in node.first_index..node.first_index + node.prim_count {
                     let Some(hit) = self.intersect(slot, ray) else { continue };
-                    if is_nearer(&hit, best.as_ref(), max_distance) && accept(hit.triangle, hit.front) {
+                    if is_nearer(&hit, best.as_ref(), max_distance) && accept(&hit) {
                         best = Some(hit);
                         // A little longer, so that a tie is not culled and the lowest index wins it.
                         ray.tmax = hit.distance * (1.0 + 8.0 * f32::EPSILON);
@@ -131,14 +132,14 @@ impl Bvh {
         self.occluded_where(origin, direction, max_distance, |_| true)
     }
 
-    /// True if a triangle that `blocks` lies on the ray nearer than `max_distance`, whichever side it shows.
+    /// True if a hit that `blocks` lies on the ray nearer than `max_distance`, whichever side it shows.
     #[must_use]
     pub fn occluded_where(
         &self,
         origin: Vec3,
         direction: Vec3,
         max_distance: f32,
-        blocks: impl Fn(u32) -> bool,
+        blocks: impl Fn(&Hit) -> bool,
     ) -> bool {
         let Some(ray) = ray(origin, direction, max_distance) else { return false };
         let mut occluded = false;
@@ -146,7 +147,7 @@ impl Bvh {
             self.tree.ray_traverse_dynamic(&mut stack, ray, &mut RayHit::none(), |node, ray, _| {
                 for slot in node.first_index..node.first_index + node.prim_count {
                     let hit = self.intersect(slot, ray);
-                    if hit.is_some_and(|hit| hit.distance < max_distance && blocks(hit.triangle)) {
+                    if hit.is_some_and(|hit| hit.distance < max_distance && blocks(&hit)) {
                         occluded = true;
                         return false;
                     }

@@ -105,7 +105,7 @@ fn ties_go_to_the_lowest_index_and_sides_are_told_apart() {
     assert!(above.triangle < 32);
     let nearest = bvh.closest(vec3(0.3, 0.4, 1.0), f32::INFINITY, |_| true).unwrap();
     assert_eq!(nearest.triangle, above.triangle);
-    let hit = bvh.hit_where(vec3(0.3, 0.4, 1.0), -Vec3::Z, f32::INFINITY, |i, _| i != above.triangle);
+    let hit = bvh.hit_where(vec3(0.3, 0.4, 1.0), -Vec3::Z, f32::INFINITY, |h| h.triangle != above.triangle);
     assert_eq!(hit.unwrap().triangle, above.triangle + 32);
 }
 
