@@ -1,6 +1,9 @@
 //! Metrics, comparison methods and benchmarks.
 
+<<<<<<< HEAD
 pub mod assets;
+=======
+>>>>>>> main
 pub mod glb;
 pub mod cornell;
 pub mod scenes;
