@@ -1,3 +1,4 @@
 //! Metrics, comparison methods and benchmarks.
 
 pub mod assets;
+pub mod sample_asset;
