@@ -1,11 +1,9 @@
 //! Metrics, comparison methods and benchmarks.
 
-<<<<<<< HEAD
 pub mod assets;
-=======
->>>>>>> main
 pub mod glb;
 pub mod cornell;
+pub mod sample_asset;
 pub mod scenes;
 pub mod metrics;
 pub mod thesis;
