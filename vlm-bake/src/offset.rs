@@ -35,7 +35,7 @@ pub struct Offset {
     pub vertex_moved: Vec<f64>,
 }
 
-/// Moves the vertices of `mesh` inward. Faces of two-sided surfaces stay where they are: no place behind hides them, so they are
+/// Moves the vertices of `mesh` inward, each face by the clearance at least and `deepest` at most (metres). Faces of two-sided surfaces stay where they are: no place behind hides them, so they are
 /// tagged later.
 pub fn offset(
     mesh: &mut LightMesh,
@@ -44,6 +44,7 @@ pub fn offset(
     standing: &Standing,
     distance: &IslandDistance,
     clearance: f64,
+    deepest: f64,
 ) -> Offset {
     let target = MARGIN * clearance;
     let rest = mesh.positions.clone();
@@ -52,7 +53,10 @@ pub fn offset(
     let needed = |mesh: &LightMesh, f: usize| {
         needed_depth(&mesh.corners(f), normals[f], standing.of(f).iter().map(|&p| &points[p as usize]), target)
     };
-    let mut depth: Vec<f64> = (0..mesh.faces.len()).into_par_iter().map(|f| needed(mesh, f).max(target)).collect();
+    // A face that would have to sink deeper than decimation can explain stands for something it does not resemble: it
+    // stays near the surface, fails the check, and is tagged.
+    let bounded = |depth: f64| if depth > deepest { target } else { depth.max(target) };
+    let mut depth: Vec<f64> = (0..mesh.faces.len()).into_par_iter().map(|f| bounded(needed(mesh, f))).collect();
     for _ in 0..ROUNDS {
         displace(mesh, &rest, &normals, &depth, &incident);
         pull_inside(mesh, patches, &incident, distance, target);
@@ -69,7 +73,7 @@ pub fn offset(
             break;
         }
         for f in failing {
-            depth[f] += needed(mesh, f).max(0.25 * target);
+            depth[f] = bounded(depth[f] + needed(mesh, f).max(0.25 * target));
         }
     }
     let vertex_moved = mesh.positions.iter().zip(&rest).map(|(moved, at)| moved.distance(*at)).collect();

@@ -1,8 +1,7 @@
 //! Merges coplanar faces and triangulates the merged polygons again, constrained Delaunay, without the vertices that no corner needs.
 
-use std::collections::HashMap;
-
 use glam::DVec3;
+use rustc_hash::FxHashMap;
 use petgraph::unionfind::UnionFind;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
 
@@ -53,7 +52,7 @@ fn coplanar_groups(mesh: &LightMesh) -> Vec<u32> {
             plane[joined.find_mut(a) as usize] = n;
         }
     }
-    let mut first: HashMap<u32, u32> = HashMap::new();
+    let mut first: FxHashMap<u32, u32> = FxHashMap::default();
     (0..triangles.len() as u32).map(|f| *first.entry(joined.find_mut(f)).or_insert(f)).collect()
 }
 
@@ -137,7 +136,7 @@ fn outline(mesh: &LightMesh, group: &[u32], needed: &[bool]) -> Option<Vec<[u32;
             [v[usize::from(uses[0].side)], v[(usize::from(uses[0].side) + 1) % 3]]
         })
         .collect();
-    let next: HashMap<u32, u32> = boundary.iter().filter(|e| !needed[e[0] as usize]).map(|e| (e[0], e[1])).collect();
+    let next: FxHashMap<u32, u32> = boundary.iter().filter(|e| !needed[e[0] as usize]).map(|e| (e[0], e[1])).collect();
     let mut outline = Vec::new();
     for &[from, mut to] in boundary.iter().filter(|e| needed[e[0] as usize]) {
         for _ in 0..=next.len() {
