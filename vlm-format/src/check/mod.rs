@@ -9,7 +9,7 @@ pub(crate) mod layout;
 
 use serde_json::Value;
 
-use crate::error::{Code, Issue, Severity};
+use crate::error::{Code, Error, Issue, Severity};
 
 /// More problems than this say nothing new, and a hostile file could list millions.
 const MAX_ISSUES: usize = 1000;
@@ -36,8 +36,16 @@ impl Report {
     }
 
     /// True if the file has to be refused.
-    pub(crate) fn has_errors(&self) -> bool {
+    fn has_errors(&self) -> bool {
         self.issues.iter().any(|issue| issue.severity == Severity::Error)
+    }
+
+    /// Turns the report into an error about `file` if the file has to be refused.
+    pub(crate) fn refuse(&self, file: &str) -> Result<(), Error> {
+        if !self.has_errors() {
+            return Ok(());
+        }
+        Err(Error::Invalid { file: file.to_owned(), issues: self.issues.clone() })
     }
 
     /// All problems, in the order in which they were found.
@@ -57,6 +65,13 @@ pub(crate) fn check_json(root: &Value) -> Report {
             break;
         }
     }
+    report
+}
+
+/// Checks the shape of our own extension: its root object, and its objects in nodes and primitives.
+pub(crate) fn check_extension(root: &Value) -> Report {
+    let mut report = Report::default();
+    shape::check_extension(root, &mut report);
     report
 }
 

@@ -19,6 +19,8 @@ pub(super) enum Shape {
     Count,
     /// Exactly so many finite numbers; 0 for any number of them.
     Numbers(usize),
+    /// Exactly so many whole numbers of 32 bits.
+    Small(usize),
     /// An index into the root array at this JSON pointer.
     Index(&'static str),
     /// A list of such indices.
@@ -54,8 +56,8 @@ const fn may(name: &'static str, shape: Shape) -> Field {
 }
 
 use Shape::{
-    Bool, Count, Index, Indices, List, Map as MapOf, Number, Numbers, Object, Objects, OneOf, Text, Texts,
-    Word,
+    Bool, Count, Index, Indices, List, Map as MapOf, Number, Numbers, Object, Objects, OneOf, Small, Text,
+    Texts, Word,
 };
 
 const NAME: Field = may("name", Text);
@@ -339,6 +341,75 @@ pub(super) fn check(root: &Value, report: &mut Report) {
     walk.value(root, Object(ROOT));
 }
 
+/// One array of the extension.
+const ARRAY: Shape = Object(&[must("accessor", ACCESSOR), must("digest", Text)]);
+
+/// The root object of `VLM_virtual_light_mesh`.
+const EXTENSION: &[Field] = &[
+    must("generator", Text),
+    must("settings", Object(&[])),
+    must("data", Object(&[must("bufferView", VIEW), must("bufferByteLength", Count)])),
+    must(
+        "vlms",
+        Objects(&[
+            must("id", Text),
+            must("lights", RANGE),
+            must("vertices", RANGE),
+            may("authored", Bool),
+            must("digests", Object(&[must("geometry", Text), must("transform", Text)])),
+        ]),
+    ),
+    must(
+        "lights",
+        Object(&[
+            may("positions", ARRAY),
+            may("indices", ARRAY),
+            may("albedo", ARRAY),
+            may("emission", ARRAY),
+            may("tags", ARRAY),
+        ]),
+    ),
+    must(
+        "samples",
+        Object(&[
+            must("starts", ARRAY),
+            may("positions", ARRAY),
+            may("normals", ARRAY),
+            may("reflectance", ARRAY),
+        ]),
+    ),
+    may(
+        "grid",
+        Object(&[
+            must("origin", Numbers(3)),
+            must("cellSize", Number),
+            must("dimensions", Small(3)),
+            may("cells", ARRAY),
+            must("starts", ARRAY),
+            may("entries", ARRAY),
+            must("sceneDigest", Text),
+        ]),
+    ),
+];
+
+/// First element and number of elements.
+const RANGE: Shape = Small(2);
+
+/// Compares the extension's objects with their tables.
+pub(super) fn check_extension(root: &Value, report: &mut Report) {
+    const NAME: &str = "VLM_virtual_light_mesh";
+    const IN_NODE: Shape = Object(&[may("extensions", Object(&[may(NAME, Object(&[must("vlm", Text)]))]))]);
+    const IN_PRIMITIVE: Shape =
+        Object(&[may("extensions", Object(&[may(NAME, Object(&[must("tag", Count)]))]))]);
+    const ROOT: &[Field] = &[
+        may("extensions", Object(&[may(NAME, Object(EXTENSION))])),
+        may("nodes", List(&IN_NODE)),
+        may("meshes", Objects(&[must("primitives", List(&IN_PRIMITIVE))])),
+    ];
+    let mut walk = Walk { root, pointer: String::new(), report };
+    walk.value(root, Object(ROOT));
+}
+
 struct Walk<'a, 'r> {
     root: &'a Value,
     /// JSON pointer of the value at hand.
@@ -362,6 +433,11 @@ impl Walk<'_, '_> {
             Objects(fields) => self.list(value, Object(fields)),
             Indices(array) => self.list(value, Index(array)),
             Texts => self.list(value, Text),
+            Small(count) => {
+                let fits = |value: &Value| value.as_u64().is_some_and(|number| u32::try_from(number).is_ok());
+                let list = value.as_array().is_some_and(|list| list.len() == count && list.iter().all(fits));
+                self.expect(list, value, "a list of whole numbers of the right length");
+            }
             Numbers(count) => {
                 if count > 0 && value.as_array().is_some_and(|list| list.len() != count) {
                     self.wrong(Code::WrongType, format!("must be a list of {count} numbers"));
