@@ -17,8 +17,9 @@ pub struct Surface {
 }
 
 /// A triangle is cut into at most this many parts along each edge for its mean, and each part looked up once. Fewer
-/// parts need coarser mip levels, which mix in what lies beside the triangle in the image; more cost time.
-const MAX_PARTS: u32 = 8;
+/// parts need coarser mip levels, which mix in what lies beside the triangle in the image; more cost time. Weighed by
+/// area, Sponza's triangles err by 6 % (4 parts), 3.5 % (6), 3.3 % (8), and groups of them by far less.
+const MAX_PARTS: u32 = 6;
 
 impl Scene {
     /// The surface at the point of a triangle that has these weights of the corners (their sum is 1).
@@ -183,6 +184,7 @@ fn texel_area(texture: &Texture, [a, b, c]: [Vec2; 3]) -> f32 {
     0.5 * (b - a).perp_dot(c - a).abs() * width as f32 * height as f32
 }
 
+#[inline]
 fn weigh<T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>([a, b, c]: [T; 3], weights: Vec3) -> T {
     a * weights.x + b * weights.y + c * weights.z
 }

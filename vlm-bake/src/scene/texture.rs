@@ -135,6 +135,7 @@ impl Texture {
         self.masked
     }
 
+    #[inline]
     fn bilinear(&self, uv: Vec2, level: usize) -> Vec4 {
         let Some(texels) = self.levels.get(level) else { return Vec4::ONE };
         let [wrap_u, wrap_v] = self.sampling.wrap;
@@ -143,13 +144,14 @@ impl Texture {
         }
         let ([left, right], blend_x) = wrap_u.neighbours(uv.x, texels.width);
         let ([top, bottom], blend_y) = wrap_v.neighbours(uv.y, texels.height);
-        let row = |y: u32| texels.get(left, y).lerp(texels.get(right, y), blend_x);
-        row(top).lerp(row(bottom), blend_y)
+        let [top_left, top_right, bottom_left, bottom_right] = texels.quad([left, right], [top, bottom]);
+        top_left.lerp(top_right, blend_x).lerp(bottom_left.lerp(bottom_right, blend_x), blend_y)
     }
 }
 
 impl Wrap {
     /// The coordinate's place within the image, 0 to 1.
+    #[inline]
     fn inside(self, coordinate: f32) -> f32 {
         match self {
             Self::Repeat => coordinate - coordinate.floor(),
@@ -159,11 +161,13 @@ impl Wrap {
     }
 
     /// The texel that holds a coordinate, of a row of `size`.
+    #[inline]
     fn nearest(self, coordinate: f32, size: u32) -> u32 {
         ((self.inside(coordinate) * size as f32) as u32).min(size - 1)
     }
 
     /// The two texels whose centres a coordinate lies between, and how far it is on the way from one to the other.
+    #[inline]
     fn neighbours(self, coordinate: f32, size: u32) -> ([u32; 2], f32) {
         let x = self.inside(coordinate) * size as f32 - 0.5;
         let first = x.floor();
@@ -180,9 +184,25 @@ impl Level {
     fn get(&self, x: u32, y: u32) -> Vec4 {
         let i = y as usize * self.width as usize + x as usize;
         match &self.texels {
-            Texels::Srgb8(texels) => texels.get(i).map_or(Vec4::ONE, |&texel| linear_from_srgb8(texel)),
+            Texels::Srgb8(texels) => linear_from_srgb8(&LINEAR, texels.get(i).copied().unwrap_or([255; 4])),
             Texels::Linear16(texels) => {
-                texels.get(i).map_or(Vec4::ONE, |&t| Vec4::from_array(t.map(|c| f32::from(c) / 65535.0)))
+                linear_from_linear16(texels.get(i).copied().unwrap_or([u16::MAX; 4]))
+            }
+        }
+    }
+
+    /// The texels at two columns and two rows, row by row: as four times [`Level::get`], but faster.
+    #[inline]
+    fn quad(&self, [left, right]: [u32; 2], [top, bottom]: [u32; 2]) -> [Vec4; 4] {
+        let index = |x: u32, y: u32| y as usize * self.width as usize + x as usize;
+        let at = [index(left, top), index(right, top), index(left, bottom), index(right, bottom)];
+        match &self.texels {
+            Texels::Srgb8(texels) => {
+                let linear = &*LINEAR;
+                at.map(|i| linear_from_srgb8(linear, texels.get(i).copied().unwrap_or([255; 4])))
+            }
+            Texels::Linear16(texels) => {
+                at.map(|i| linear_from_linear16(texels.get(i).copied().unwrap_or([u16::MAX; 4])))
             }
         }
     }
@@ -253,10 +273,15 @@ fn linear16(color: Vec4) -> [u16; 4] {
     color.to_array().map(|c| (c.clamp(0.0, 1.0) * 65535.0 + 0.5) as u16)
 }
 
-fn linear_from_srgb8([r, g, b, a]: [u8; 4]) -> Vec4 {
-    let table = &*LINEAR;
-    let linear = |byte: u8| table[usize::from(byte)];
-    Vec4::new(linear(r), linear(g), linear(b), f32::from(a) / 255.0)
+#[inline]
+fn linear_from_linear16(texel: [u16; 4]) -> Vec4 {
+    Vec4::from_array(texel.map(f32::from)) * (1.0 / 65535.0)
+}
+
+#[inline]
+fn linear_from_srgb8(linear: &[f32; 256], [r, g, b, a]: [u8; 4]) -> Vec4 {
+    let linear = |byte: u8| linear[usize::from(byte)];
+    Vec4::new(linear(r), linear(g), linear(b), f32::from(a) * (1.0 / 255.0))
 }
 
 /// The sRGB transfer function (IEC 61966-2-1) for every byte.
@@ -293,7 +318,7 @@ mod tests {
         for size in [[4, 4], [5, 3], [7, 1], [1, 13], [255, 6]] {
             let count = size[0] * size[1];
             let texels: Vec<_> = (0..count).map(|i| [(i * 37 % 256) as u8, 0, 255, 255]).collect();
-            let expected = texels.iter().map(|&t| linear_from_srgb8(t)).sum::<Vec4>() / count as f32;
+            let expected = texels.iter().map(|&t| linear_from_srgb8(&LINEAR, t)).sum::<Vec4>() / count as f32;
             let texture = texture(size, texels, Wrap::Repeat);
             let mean = texture.sample(vec2(0.5, 0.5), 99.0);
             assert!(mean.abs_diff_eq(expected, 1e-4), "{size:?}: {mean} against {expected}");
