@@ -3,6 +3,7 @@
 pub mod assets;
 pub mod glb;
 pub mod cornell;
+pub mod sample_asset;
 pub mod scenes;
 pub mod metrics;
 pub mod thesis;

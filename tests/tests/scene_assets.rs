@@ -40,7 +40,10 @@ fn load(path: &Path) -> Scene {
     check(&scene);
     let possible = |x: f32| (0.0..=1.0).contains(&x);
     for surface in surfaces {
-        assert!(surface.albedo.to_array().into_iter().all(possible) && possible(surface.coverage), "{surface:?}");
+        assert!(
+            surface.albedo.to_array().into_iter().all(possible) && possible(surface.coverage),
+            "{surface:?}"
+        );
         assert!(surface.emission.is_finite() && surface.emission.min_element() >= 0.0, "{surface:?}");
     }
     scene

@@ -80,7 +80,8 @@ impl Eq for Candidate {}
 /// 0 makes no lights.
 #[must_use]
 pub fn refine(mesh: &LightMesh, density: &[f64], budget: usize) -> Lights {
-    let mut cutter = Cutter { positions: mesh.positions.clone(), lights: Vec::new(), midpoints: HashMap::new() };
+    let mut cutter =
+        Cutter { positions: mesh.positions.clone(), lights: Vec::new(), midpoints: HashMap::new() };
     for (f, face) in mesh.faces.iter().enumerate() {
         if density[f] > 0.0 {
             cutter.add_shapely(Light { vertices: face.vertices, face: f as u32 });

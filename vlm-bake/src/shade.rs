@@ -1,5 +1,6 @@
 //! A scene ready for rays: what they meet, what colour it has there, and the direct light on it.
 
+use std::borrow::Cow;
 use std::f32::consts::PI;
 
 use glam::Vec3;
@@ -14,7 +15,7 @@ pub struct TraceScene<'a> {
     pub scene: &'a Scene,
     /// The tree over [`Scene::triangles`].
     pub bvh: Bvh,
-    /// The punctual lights.
+    /// The punctual lights, or the default sun in a scene without any light.
     pub lights: Vec<punctual::PunctualLight>,
     sides: Vec<Sides>,
 }
@@ -52,7 +53,7 @@ impl<'a> TraceScene<'a> {
     #[must_use]
     pub fn new(scene: &'a Scene) -> Self {
         let sides = scene.triangle_primitive.iter().map(|&primitive| sides_of(scene, primitive)).collect();
-        let lights = scene.lights.iter().map(punctual_light).collect();
+        let lights = scene.lights_or_default().iter().map(punctual_light).collect();
         Self { scene, bvh: Bvh::new(&scene.positions, &scene.triangles), lights, sides }
     }
 
@@ -95,7 +96,8 @@ impl<'a> TraceScene<'a> {
         let geometric_normal = (p1 - p0).cross(p2 - p0).try_normalize()? * side;
         let normal =
             interpolate(&scene.vertex_normals).try_normalize().map_or(geometric_normal, |n| n * side);
-        let (albedo, emission) = self.colors(hit, footprint);
+        let scene::Surface { albedo, emission, .. } =
+            scene.albedo_at(hit.triangle as usize, hit.barycentric, footprint);
         let position = interpolate(&scene.positions);
         Some(SurfacePoint { triangle: hit.triangle, position, normal, geometric_normal, albedo, emission })
     }
@@ -142,14 +144,29 @@ impl<'a> TraceScene<'a> {
     fn sides(&self, triangle: u32) -> Sides {
         self.sides.get(triangle as usize).copied().unwrap_or(Sides::Front)
     }
+}
 
-    fn colors(&self, hit: &Hit, footprint: f32) -> (Vec3, Vec3) {
-        let _ = footprint;
-        let scene = self.scene;
-        let primitive = scene.triangle_primitive.get(hit.triangle as usize);
-        let primitive = primitive.and_then(|&p| scene.primitives.get(p as usize));
-        let material = primitive.and_then(|p| scene.materials.get(p.material as usize));
-        material.map_or((Vec3::ZERO, Vec3::ZERO), |m| (m.base_color, m.emission))
+impl Scene {
+    /// True if nothing in the file shines: no punctual light, no emissive material.
+    #[must_use]
+    pub fn is_unlit(&self) -> bool {
+        self.lights.is_empty() && self.materials.iter().all(|m| m.emission == Vec3::ZERO)
+    }
+
+    /// The file's punctual lights; in a scene where nothing shines, a white sun of 10,000 lx from the upper left front.
+    #[must_use]
+    pub fn lights_or_default(&self) -> Cow<'_, [scene::PunctualLight]> {
+        if !self.is_unlit() {
+            return Cow::Borrowed(&self.lights);
+        }
+        let sun = scene::PunctualLight {
+            kind: PunctualKind::Directional,
+            position: Vec3::ZERO,
+            direction: Vec3::new(0.4, -1.0, -0.6).normalize_or_zero(),
+            intensity: Vec3::splat(10_000.0),
+            range: f32::INFINITY,
+        };
+        Cow::Owned(vec![sun])
     }
 }
 

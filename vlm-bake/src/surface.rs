@@ -90,7 +90,12 @@ pub fn spread_over([a, b, c]: [DVec3; 3], count: u32) -> impl Iterator<Item = DV
 /// same way. `None` where decimation left none within `reach` metres: the point's light is lost, and the report says how
 /// much.
 #[must_use]
-pub fn stand_ins(points: &[SurfacePoint], patches: &Patches, mesh: &LightMesh, reach: f64) -> Vec<Option<u32>> {
+pub fn stand_ins(
+    points: &[SurfacePoint],
+    patches: &Patches,
+    mesh: &LightMesh,
+    reach: f64,
+) -> Vec<Option<u32>> {
     let origin = mesh.positions.first().copied().unwrap_or_default();
     let positions: Vec<Vec3> = mesh.positions.iter().map(|p| (p - origin).as_vec3()).collect();
     let triangles: Vec<[u32; 3]> = mesh.faces.iter().map(|f| f.vertices).collect();
@@ -102,7 +107,8 @@ pub fn stand_ins(points: &[SurfacePoint], patches: &Patches, mesh: &LightMesh, r
             let region = patches.triangle_region[point.triangle as usize];
             let place = &patches.regions[region as usize];
             let alike = |f: u32| {
-                mesh.faces[f as usize].back == point.back && normals[f as usize].dot(point.normal) > LEAST_COSINE
+                mesh.faces[f as usize].back == point.back
+                    && normals[f as usize].dot(point.normal) > LEAST_COSINE
             };
             let near = (point.position - origin).as_vec3();
             let own = |f: u32| mesh.faces[f as usize].region == region && alike(f);

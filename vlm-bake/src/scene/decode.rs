@@ -50,8 +50,9 @@ pub(super) fn textures(
 
 fn decode(file: &GltfFile, image: usize) -> Result<RgbaImage, String> {
     let bytes = file.image_bytes(image).map_err(|error| error.to_string())?;
-    let mut reader =
-        ImageReader::new(Cursor::new(bytes.as_ref())).with_guessed_format().map_err(|error| error.to_string())?;
+    let mut reader = ImageReader::new(Cursor::new(bytes.as_ref()))
+        .with_guessed_format()
+        .map_err(|error| error.to_string())?;
     let mut limits = Limits::default();
     limits.max_image_width = Some(MAX_SIDE);
     limits.max_image_height = Some(MAX_SIDE);
@@ -61,7 +62,12 @@ fn decode(file: &GltfFile, image: usize) -> Result<RgbaImage, String> {
 }
 
 /// One texture for each of the requests with these numbers.
-fn build(pixels: &RgbaImage, requests: &[TextureRequest], numbers: &[usize], options: &LoadOptions) -> Vec<Option<Texture>> {
+fn build(
+    pixels: &RgbaImage,
+    requests: &[TextureRequest],
+    numbers: &[usize],
+    options: &LoadOptions,
+) -> Vec<Option<Texture>> {
     let texels: Vec<[u8; 4]> = pixels.pixels().map(|pixel| pixel.0).collect();
     let size = [pixels.width(), pixels.height()];
     let build_one = |request: &TextureRequest| {

@@ -103,7 +103,10 @@ fn vertex_matrices(
         }
     }
     let fallback = world_from_bind.first().copied().unwrap_or(DMat4::IDENTITY);
-    Ok(sums.into_iter().map(|(sum, weight)| if weight > 0.0 { sum * (1.0 / weight) } else { fallback }).collect())
+    Ok(sums
+        .into_iter()
+        .map(|(sum, weight)| if weight > 0.0 { sum * (1.0 / weight) } else { fallback })
+        .collect())
 }
 
 fn add_influences(sum: &mut (DMat4, f64), joints: UVec4, weights: Vec4, world_from_bind: &[DMat4]) {
@@ -130,7 +133,11 @@ pub(super) fn instances(file: &GltfFile, node: &gltf::Node) -> Result<Vec<DMat4>
     let rotations = accessor("ROTATION").map(|a| file.read_vec4(a)).transpose()?;
     let scales = accessor("SCALE").map(|a| file.read_vec3(a)).transpose()?;
 
-    let lengths = [translations.as_ref().map(Vec::len), rotations.as_ref().map(Vec::len), scales.as_ref().map(Vec::len)];
+    let lengths = [
+        translations.as_ref().map(Vec::len),
+        rotations.as_ref().map(Vec::len),
+        scales.as_ref().map(Vec::len),
+    ];
     let count = lengths.into_iter().flatten().max().unwrap_or(0);
     let vector = |values: &Option<Vec<Vec3>>, i: usize, default: DVec3| {
         values.as_ref().and_then(|values| values.get(i)).map_or(default, |v| v.as_dvec3())

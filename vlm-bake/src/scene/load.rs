@@ -62,7 +62,9 @@ pub enum Error {
         pointer: String,
     },
     /// The scene does not fit into the arrays.
-    #[error("{file}: the scene has more than {limit} vertices once every instance is placed; bake it in parts")]
+    #[error(
+        "{file}: the scene has more than {limit} vertices once every instance is placed; bake it in parts"
+    )]
     TooLarge {
         /// Name of the file.
         file: String,
@@ -132,8 +134,13 @@ impl<'a> Loader<'a> {
 
     fn add_object(&mut self, index: usize, placed: &PlacedNode, mesh: &gltf::Mesh) -> Result<(), Error> {
         let node = &placed.node;
-        let request =
-            steering::read(self.file.name(), self.file.json(), node.index(), mesh.index(), &mut self.scene.notes)?;
+        let request = steering::read(
+            self.file.name(),
+            self.file.json(),
+            node.index(),
+            mesh.index(),
+            &mut self.scene.notes,
+        )?;
         let mut parts = Vec::new();
         for primitive in mesh.primitives() {
             match self.local_mesh(mesh, &primitive)? {
@@ -198,7 +205,11 @@ impl<'a> Loader<'a> {
     }
 
     /// The primitive in its mesh's space, read when first asked for.
-    fn local_mesh(&mut self, mesh: &gltf::Mesh, primitive: &gltf::Primitive) -> Result<Option<Rc<LocalMesh>>, Error> {
+    fn local_mesh(
+        &mut self,
+        mesh: &gltf::Mesh,
+        primitive: &gltf::Primitive,
+    ) -> Result<Option<Rc<LocalMesh>>, Error> {
         let key = (mesh.index(), primitive.index());
         if let Some(known) = self.local_meshes.get(&key) {
             return Ok(known.clone());
@@ -236,13 +247,19 @@ impl<'a> Loader<'a> {
         let document = self.file.document();
         if document.scenes().len() > 1 {
             let drawn = document.default_scene().map_or(0, |scene| scene.index());
-            notes.push(format!("/scenes/{drawn}: drawn; the file's {} other scenes are not", document.scenes().len() - 1));
+            notes.push(format!(
+                "/scenes/{drawn}: drawn; the file's {} other scenes are not",
+                document.scenes().len() - 1
+            ));
         }
         for (mesh, primitive) in &self.pointless {
             notes.push(format!("/meshes/{mesh}/primitives/{primitive}: points or lines; left out"));
         }
         if self.skinned > 0 {
-            notes.push(format!("{} skinned primitives keep the pose that their joints hold in the file", self.skinned));
+            notes.push(format!(
+                "{} skinned primitives keep the pose that their joints hold in the file",
+                self.skinned
+            ));
         }
         if self.scene.degenerate_triangles > 0 {
             notes.push(format!("{} triangles without area left out", self.scene.degenerate_triangles));

@@ -31,7 +31,9 @@ impl Scene {
         let look_up = |texture: Option<&Texture>, uvs: [Vec2; 3]| {
             let Some(texture) = texture else { return Vec4::ONE };
             let level = match footprint {
-                area if area > 0.0 => texture.level_of(texel_area(texture, uvs) * area / patch.world_area(self)),
+                area if area > 0.0 => {
+                    texture.level_of(texel_area(texture, uvs) * area / patch.world_area(self))
+                }
                 _ => 0.0,
             };
             texture.sample(weigh(uvs, barycentric), level)
@@ -185,7 +187,10 @@ fn texel_area(texture: &Texture, [a, b, c]: [Vec2; 3]) -> f32 {
 }
 
 #[inline]
-fn weigh<T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>([a, b, c]: [T; 3], weights: Vec3) -> T {
+fn weigh<T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>(
+    [a, b, c]: [T; 3],
+    weights: Vec3,
+) -> T {
     a * weights.x + b * weights.y + c * weights.z
 }
 

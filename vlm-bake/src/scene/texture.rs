@@ -185,9 +185,7 @@ impl Level {
         let i = y as usize * self.width as usize + x as usize;
         match &self.texels {
             Texels::Srgb8(texels) => linear_from_srgb8(&LINEAR, texels.get(i).copied().unwrap_or([255; 4])),
-            Texels::Linear16(texels) => {
-                linear_from_linear16(texels.get(i).copied().unwrap_or([u16::MAX; 4]))
-            }
+            Texels::Linear16(texels) => linear_from_linear16(texels.get(i).copied().unwrap_or([u16::MAX; 4])),
         }
     }
 
