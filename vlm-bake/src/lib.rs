@@ -1,11 +1,13 @@
-//! Bakes Virtual Light Meshes from glTF.
+//! Bakes Virtual Light Meshes from glTF, and renders them on the CPU.
 //!
-//! Stages, in the order in which data flows:
+//! Stages of the bake, in the order in which data flows:
 //! `scene -> patches -> decimate -> offset -> verify -> tag -> refine -> samples -> authored -> grid -> write`.
 //! For pictures on the CPU: `scene, bvh -> camera -> shade -> gbuffer -> reference | render -> picture`.
 
 pub mod options;
 pub mod progress;
+pub mod report;
+
 pub mod bake;
 pub mod scene;
 pub mod patches;
@@ -22,9 +24,10 @@ pub mod samples;
 pub mod authored;
 pub mod grid;
 pub mod write;
-pub mod report;
+
 pub mod bvh;
 pub mod topology;
+
 pub mod camera;
 pub mod shade;
 pub mod gbuffer;

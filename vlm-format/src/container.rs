@@ -29,6 +29,8 @@ pub struct GltfFile {
     name: String,
     folder: Option<PathBuf>,
     kind: Kind,
+    /// What each level of the JSON is indented by; `None` for JSON on one line.
+    indent: Option<String>,
     json: Value,
     document: gltf::Document,
     /// The BIN chunk: buffer 0, if that has no URI.
@@ -72,6 +74,7 @@ impl GltfFile {
             name: name.to_owned(),
             folder: folder.map(Path::to_owned),
             kind: packed.kind,
+            indent: packed.indent,
             document,
             bin: packed.bin.map(<[u8]>::to_vec),
             buffers,
@@ -188,6 +191,11 @@ impl GltfFile {
         &self.other_chunks
     }
 
+    /// What each level of the JSON is indented by; `None` for JSON on one line.
+    pub(crate) fn indent(&self) -> Option<&str> {
+        self.indent.as_deref()
+    }
+
     /// Where files beside this one lie.
     pub(crate) fn folder(&self) -> Option<&Path> {
         self.folder.as_deref()
@@ -201,6 +209,7 @@ fn cut_off(pointer: String) -> Issue {
 /// The parts of a file, before any check.
 struct Unpacked<'a> {
     kind: Kind,
+    indent: Option<String>,
     json: Value,
     bin: Option<&'a [u8]>,
     others: Vec<(u32, Vec<u8>)>,
@@ -210,13 +219,33 @@ fn unpack(bytes: &[u8]) -> Result<Unpacked<'_>, Issue> {
     if glb::is_glb(bytes) {
         let glb = glb::parse(bytes)?;
         let others = glb.others.into_iter().map(|(kind, data)| (kind, data.to_vec())).collect();
-        return Ok(Unpacked { kind: Kind::Glb, json: parse_json(glb.json)?, bin: glb.bin, others });
+        return Ok(Unpacked {
+            kind: Kind::Glb,
+            json: parse_json(glb.json)?,
+            bin: glb.bin,
+            others,
+            indent: indent(glb.json),
+        });
     }
     let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     if text.trim_ascii_start().first() != Some(&b'{') {
         return Err(Issue::error(Code::NotGltf, "", "the file is neither GLB nor JSON"));
     }
-    Ok(Unpacked { kind: Kind::Gltf, json: parse_json(text)?, bin: None, others: Vec::new() })
+    Ok(Unpacked {
+        kind: Kind::Gltf,
+        json: parse_json(text)?,
+        bin: None,
+        others: Vec::new(),
+        indent: indent(text),
+    })
+}
+
+/// The white space before the first key, if that stands on a line of its own.
+fn indent(json: &[u8]) -> Option<String> {
+    let rest = json.trim_ascii_start().strip_prefix(b"{")?;
+    let blank = rest.iter().take_while(|byte| byte.is_ascii_whitespace()).count();
+    let line = rest[..blank].iter().rposition(|&byte| byte == b'\n')?;
+    std::str::from_utf8(&rest[line + 1..blank]).ok().map(str::to_owned)
 }
 
 fn parse_json(bytes: &[u8]) -> Result<Value, Issue> {

@@ -7,6 +7,8 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use base64::Engine;
+use serde::Serialize;
+use serde_json::ser::{PrettyFormatter, Serializer};
 use serde_json::{Value, json};
 
 use crate::check::array;
@@ -88,6 +90,8 @@ pub(crate) struct Parts {
     /// Files that relative URIs name.
     files: Vec<OutputFile>,
     kind: Kind,
+    /// What each level of the JSON is indented by; `None` for JSON on one line.
+    indent: Option<String>,
 }
 
 impl Parts {
@@ -107,14 +111,21 @@ impl Parts {
             others: file.other_chunks().to_vec(),
             files,
             kind: file.kind().clone(),
+            indent: file.indent().map(str::to_owned),
         }
     }
 
     /// Moves buffer 0 to where the target's container has it.
     pub(crate) fn convert(&mut self, file: &GltfFile, target: &Target) {
         match (&self.kind, target.container) {
-            (Kind::Gltf, Container::Glb) => self.buffer_to_bin(file),
-            (Kind::Glb, Container::Gltf { .. }) => self.bin_to_uri(target),
+            (Kind::Gltf, Container::Glb) => {
+                self.indent = None;
+                self.buffer_to_bin(file);
+            }
+            (Kind::Glb, Container::Gltf { .. }) => {
+                self.indent = Some(String::from("  "));
+                self.bin_to_uri(target);
+            }
             _ => {}
         }
         self.kind = if target.container == Container::Glb { Kind::Glb } else { Kind::Gltf };
@@ -178,9 +189,10 @@ impl Parts {
 
     /// The files of the output; the main one first.
     pub(crate) fn pack(self, target: &Target) -> Result<Vec<OutputFile>, Error> {
+        let json = to_text(&self.json, self.indent.as_deref());
         let bytes = match target.container {
-            Container::Glb => glb::build(self.json.to_string().as_bytes(), self.bin.as_deref(), &self.others),
-            Container::Gltf { .. } => serde_json::to_vec_pretty(&self.json).ok(),
+            Container::Glb => glb::build(&json, self.bin.as_deref(), &self.others),
+            Container::Gltf { .. } => Some(json),
         };
         let Some(bytes) = bytes else {
             return Err(
@@ -190,6 +202,15 @@ impl Parts {
         let main = OutputFile { path: PathBuf::from(&target.file_name), bytes, copied_from: None };
         Ok(std::iter::once(main).chain(self.files).collect())
     }
+}
+
+/// JSON in the style of its source, so that version control shows little more than what was added.
+fn to_text(json: &Value, indent: Option<&str>) -> Vec<u8> {
+    let Some(indent) = indent else { return json.to_string().into_bytes() };
+    let mut text = Vec::new();
+    let style = PrettyFormatter::with_indent(indent.as_bytes());
+    let written = json.serialize(&mut Serializer::with_formatter(&mut text, style));
+    if written.is_ok() { text } else { json.to_string().into_bytes() }
 }
 
 /// Encodes what may not stand in a relative URI (RFC 3986, section 3.3; `:` could be taken for a scheme).

@@ -21,7 +21,7 @@ pub fn write_atomic(outputs: &[OutputFile], folder: &Path) -> Result<(), Error> 
     for output in outputs.iter().rev() {
         let path = folder.join(&output.path);
         if !has_content(&path, &output.bytes) {
-            pending.push(Pending::write(path, &output.bytes, folder)?);
+            pending.push(Pending::write(&path, &output.bytes, folder)?);
         }
     }
     pending.into_iter().try_for_each(Pending::rename)
@@ -40,8 +40,8 @@ struct Pending {
 }
 
 impl Pending {
-    fn write(path: PathBuf, bytes: &[u8], folder: &Path) -> Result<Self, Error> {
-        let io = |source| Error::Io { path: path.clone(), action: "write", source };
+    fn write(path: &Path, bytes: &[u8], folder: &Path) -> Result<Self, Error> {
+        let io = |source| Error::Io { path: path.to_owned(), action: "write", source };
         if !folder.is_dir() {
             let source = io::Error::new(io::ErrorKind::NotFound, "the output folder does not exist");
             return Err(Error::Io { path: folder.to_owned(), action: "write into", source });
@@ -52,8 +52,8 @@ impl Pending {
         if let Some(parent) = path.parent() {
             fs::create_dir_all(parent).map_err(io)?;
         }
-        let (temporary, mut file) = create_beside(&path).map_err(io)?;
-        let pending = Self { temporary, path: path.clone(), renamed: false };
+        let (temporary, mut file) = create_beside(path).map_err(io)?;
+        let pending = Self { temporary, path: path.to_owned(), renamed: false };
         file.write_all(bytes).and_then(|()| file.sync_all()).map_err(io)?;
         Ok(pending)
     }

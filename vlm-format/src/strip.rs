@@ -63,18 +63,11 @@ fn shrink_buffer(buffer: usize, offset: usize, before: u64, parts: &mut Parts) -
     } else if buffer + 1 == buffers {
         truncate(&mut parts.json, "buffers", buffer);
     }
-    match uri {
-        Some(uri) => parts.drop_file(&uri),
-        None => {
-            parts.bin = parts
-                .bin
-                .take()
-                .map(|mut bin| {
-                    bin.truncate(offset);
-                    bin
-                })
-                .filter(|bin| !bin.is_empty())
-        }
+    if let Some(uri) = uri {
+        parts.drop_file(&uri);
+    } else if let Some(bin) = &mut parts.bin {
+        bin.truncate(offset);
+        parts.bin.take_if(|bin| bin.is_empty());
     }
     Some(())
 }

@@ -207,6 +207,7 @@ mod surface;
 mod authored;
 mod light;
 mod camera;
+mod defaults;
 
 pub use authored::Volume;
 pub use load::{Error, LoadOptions, load};
