@@ -1,8 +1,6 @@
 //! Camera rays.
 
-use std::borrow::Cow;
-
-use glam::{DMat4, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
 use crate::scene::{Camera, Projection, Scene};
 
@@ -72,18 +70,6 @@ impl CameraRays {
     }
 }
 
-impl Scene {
-    /// The file's cameras; one that frames the whole scene where it has none.
-    #[must_use]
-    pub fn cameras_or_default(&self) -> Cow<'_, [Camera]> {
-        if self.cameras.is_empty() {
-            Cow::Owned(vec![framing_camera(self)])
-        } else {
-            Cow::Borrowed(&self.cameras)
-        }
-    }
-}
-
 /// There is no such camera.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("there is no camera `{wanted}`: name one of {available}, or give its number from 0")]
@@ -113,33 +99,10 @@ impl Scene {
     }
 }
 
-/// A camera that sees the whole scene from its front, a little from above.
-fn framing_camera(scene: &Scene) -> Camera {
-    const VERTICAL_ANGLE: f64 = 0.8;
-    let finite = scene.positions.iter().filter(|p| p.is_finite()).map(|p| p.as_dvec3());
-    let (low, high) = finite.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
-    let (low, high) = if low.x <= high.x { (low, high) } else { (DVec3::NEG_ONE, DVec3::ONE) };
-    let centre = 0.5 * (low + high);
-    let radius = (0.5 * (high - low).length()).max(1e-3);
-    let away = DVec3::new(0.35, 0.35, 1.0).normalize_or_zero();
-    let eye = centre + away * (radius / (0.5 * VERTICAL_ANGLE).sin());
-    Camera {
-        name: "framing camera".to_owned(),
-        world_from_view: looking_from(eye, away),
-        projection: Projection::Perspective(VERTICAL_ANGLE as f32),
-    }
-}
-
-/// A view at `eye` whose z axis, away from what it looks at, is the unit vector `back` (not straight up or down).
-fn looking_from(eye: DVec3, back: DVec3) -> DMat4 {
-    let right = DVec3::Y.cross(back).normalize_or_zero();
-    let up = back.cross(right);
-    DMat4::from_cols(right.extend(0.0), up.extend(0.0), back.extend(0.0), eye.extend(1.0))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DMat4;
 
     fn camera(projection: Projection) -> Camera {
         let world_from_view = DMat4::from_translation(DVec3::new(0.0, 0.0, 5.0));
@@ -178,19 +141,5 @@ mod tests {
         assert_eq!(scene.camera(None).unwrap().name, "nave");
         let message = found("roof").unwrap_err().to_string();
         assert!(message.contains("roof") && message.contains("`nave`"), "{message}");
-    }
-
-    #[test]
-    fn framing_camera_sees_every_corner() {
-        let positions =
-            (0..8).map(|i| Vec3::new((i & 1) as f32 * 9.0, (i & 2) as f32, (i & 4) as f32)).collect();
-        let scene = Scene { positions, ..Scene::default() };
-        let camera = scene.cameras_or_default()[0].clone();
-        let view_from_world = camera.world_from_view.inverse();
-        let Projection::Perspective(angle) = camera.projection else { panic!() };
-        for p in &scene.positions {
-            let p = view_from_world.transform_point3(p.as_dvec3());
-            assert!(p.z < 0.0 && p.x.abs().max(p.y.abs()) <= -p.z * f64::from(0.5 * angle).tan());
-        }
     }
 }

@@ -1,6 +1,5 @@
 //! A scene ready for rays: what they meet, what colour it has there, and the direct light on it.
 
-use std::borrow::Cow;
 use std::f32::consts::PI;
 
 use glam::Vec3;
@@ -15,7 +14,7 @@ pub struct TraceScene<'a> {
     pub scene: &'a Scene,
     /// The tree over [`Scene::triangles`].
     pub bvh: Bvh,
-    /// The punctual lights, or the default sun in a scene without any light.
+    /// The punctual lights; the default light in a scene where nothing shines.
     pub lights: Vec<punctual::PunctualLight>,
     sides: Vec<Sides>,
 }
@@ -143,30 +142,6 @@ impl<'a> TraceScene<'a> {
 
     fn sides(&self, triangle: u32) -> Sides {
         self.sides.get(triangle as usize).copied().unwrap_or(Sides::Front)
-    }
-}
-
-impl Scene {
-    /// True if nothing in the file shines: no punctual light, no emissive material.
-    #[must_use]
-    pub fn is_unlit(&self) -> bool {
-        self.lights.is_empty() && self.materials.iter().all(|m| m.emission == Vec3::ZERO)
-    }
-
-    /// The file's punctual lights; in a scene where nothing shines, a white sun of 10,000 lx from the upper left front.
-    #[must_use]
-    pub fn lights_or_default(&self) -> Cow<'_, [scene::PunctualLight]> {
-        if !self.is_unlit() {
-            return Cow::Borrowed(&self.lights);
-        }
-        let sun = scene::PunctualLight {
-            kind: PunctualKind::Directional,
-            position: Vec3::ZERO,
-            direction: Vec3::new(0.4, -1.0, -0.6).normalize_or_zero(),
-            intensity: Vec3::splat(10_000.0),
-            range: f32::INFINITY,
-        };
-        Cow::Owned(vec![sun])
     }
 }
 

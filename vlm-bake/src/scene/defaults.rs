@@ -56,7 +56,11 @@ impl Scene {
     /// The file's cameras; without any, one named `default` from which most of the scene can be seen.
     #[must_use]
     pub fn cameras_or_default(&self) -> Cow<'_, [Camera]> {
-        if self.cameras.is_empty() { vec![self.default_camera(self.setting())].into() } else { (&self.cameras).into() }
+        if self.cameras.is_empty() {
+            vec![self.default_camera(self.setting())].into()
+        } else {
+            (&self.cameras).into()
+        }
     }
 
     /// The file's lights; without any, and if no surface emits either, one that lights what the default camera sees.
@@ -76,7 +80,9 @@ impl Scene {
         if !self.is_lit() {
             self.lights = vec![self.default_light(setting)];
             notes.push(match setting {
-                Setting::Room { .. } => format!("no light in the file: shown with a lamp of {:.0} cd", self.lights[0].intensity.x),
+                Setting::Room { .. } => {
+                    format!("no light in the file: shown with a lamp of {:.0} cd", self.lights[0].intensity.x)
+                }
                 _ => format!("no light in the file: shown with a sun of {SUN:.0} lx"),
             });
         }
@@ -93,7 +99,8 @@ impl Scene {
 
     /// A light shines or a surface glows.
     fn is_lit(&self) -> bool {
-        let glows = |material: u32| self.materials.get(material as usize).is_some_and(|m| m.emission != Vec3::ZERO);
+        let glows =
+            |material: u32| self.materials.get(material as usize).is_some_and(|m| m.emission != Vec3::ZERO);
         !self.lights.is_empty() || self.primitives.iter().any(|p| p.triangles[1] > 0 && glows(p.material))
     }
 
@@ -102,8 +109,11 @@ impl Scene {
         let [minimum, maximum] = self.framed_box();
         let place = |x: f32, y: f32, z: f32| minimum + Vec3::new(x, y, z) * (maximum - minimum);
         let survey = |origin| Survey::from(&bvh, origin, (maximum - minimum).length());
-        let places = PLACES.iter().flat_map(|&x| PLACES.iter().flat_map(move |&y| PLACES.iter().map(move |&z| (x, y, z))));
-        let free: Vec<Survey> = places.map(|(x, y, z)| survey(place(x, y, z))).filter(|s| s.backs < 0.5).collect();
+        let places = PLACES
+            .iter()
+            .flat_map(|&x| PLACES.iter().flat_map(move |&y| PLACES.iter().map(move |&z| (x, y, z))));
+        let free: Vec<Survey> =
+            places.map(|(x, y, z)| survey(place(x, y, z))).filter(|s| s.backs < 0.5).collect();
         let rooms = || free.iter().filter(|s| s.fronts >= ROOM_SHARE);
         let best = rooms().reduce(|a, b| if b.distance > a.distance { b } else { a });
         if let (Some(best), true) = (best, 2 * rooms().count() > free.len()) {
@@ -112,7 +122,9 @@ impl Scene {
         let middle = survey(place(0.5, 0.5, 0.5));
         let opening = Vec3::new(middle.escape.x, 0.0, middle.escape.z);
         // Most rays must meet fronts, and those that escape must not go up: that would be a yard without roof.
-        let open_box = middle.fronts > 0.5 && middle.escape.length() > ONE_SIDED && opening.length() > middle.escape.y.abs();
+        let open_box = middle.fronts > 0.5
+            && middle.escape.length() > ONE_SIDED
+            && opening.length() > middle.escape.y.abs();
         match opening.try_normalize() {
             Some(opening) if open_box => Setting::Box(opening),
             _ => Setting::Object,
@@ -160,8 +172,13 @@ impl Scene {
     /// Corners of the box to look at: around all triangles, or around all but the outermost hundredth at either end of
     /// each axis where that is far smaller, as in a tree on an endless sea.
     fn framed_box(&self) -> [Vec3; 2] {
-        let corners: Vec<Vec3> =
-            self.triangles.iter().flatten().filter_map(|&v| self.positions.get(v as usize)).copied().collect();
+        let corners: Vec<Vec3> = self
+            .triangles
+            .iter()
+            .flatten()
+            .filter_map(|&v| self.positions.get(v as usize))
+            .copied()
+            .collect();
         let along = |axis: usize| -> [[f32; 2]; 2] {
             let mut values: Vec<f32> = corners.iter().map(|corner| corner[axis]).collect();
             values.sort_unstable_by(f32::total_cmp);

@@ -18,7 +18,7 @@ use crate::progress::Bars;
 pub struct RenderArgs {
     /// glTF file (.glb or .gltf), or - for standard input (.glb)
     file: PathBuf,
-    /// Camera of the file, by name or number from 0 [default: the first; one that frames the scene if there is none]
+    /// Camera of the file, by name or number from 0 [default: the first; one chosen to show the scene if there is none]
     #[arg(long, value_name = "NAME|INDEX")]
     camera: Option<String>,
     /// Size of the picture in pixels
@@ -80,7 +80,8 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let method = Method::from(args.method);
     bars.begin("read", 1);
     let file = open(&args.file)?;
-    let scene = load(&file, &LoadOptions::default())?;
+    let mut scene = load(&file, &LoadOptions::default())?;
+    let notes = scene.add_defaults_for_view();
     let needs_lights = matches!(method, Method::Vlm | Method::Brute);
     let asset = if needs_lights { read_vlm(&file)? } else { None };
     let camera = scene.camera(args.camera.as_deref())?;
@@ -97,8 +98,8 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
         method: method.name().to_owned(),
         stats: rendering.stats,
     };
-    if scene.is_unlit() {
-        eprintln!("note: nothing in {} shines, so a default sun of 10,000 lx lights it", file.name());
+    for note in notes {
+        eprintln!("note: {}: {note}", file.name());
     }
     print_report(args, &report, exposure)
 }
