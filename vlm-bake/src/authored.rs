@@ -125,7 +125,11 @@ impl VisibleSurface {
         let corners = |t: &[u32; 3]| t.map(|v| scene.positions[v as usize].as_dvec3());
         Self {
             bvh: Bvh::new(&scene.positions, &scene.triangles),
-            normals: scene.triangles.iter().map(|t| cross_of(corners(t)).normalize_or_zero().as_vec3()).collect(),
+            normals: scene
+                .triangles
+                .iter()
+                .map(|t| cross_of(corners(t)).normalize_or_zero().as_vec3())
+                .collect(),
             extent: scene.bounds().map_or(0.0, |[low, high]| (high - low).max_element() as f32),
         }
     }
@@ -157,7 +161,8 @@ impl AuthoredLights<'_> {
         let normal = cross_of(corners).try_normalize()?;
         let steering = &self.scene.objects[self.mesh.object as usize].steering;
         let own = self.surface_behind(corners, normal);
-        let failing = own.iter().find(|(point, _)| self_lighting(&corners, normal, point, self.clearance) > 0.0);
+        let failing =
+            own.iter().find(|(point, _)| self_lighting(&corners, normal, point, self.clearance) > 0.0);
         let failing = failing.map(|(point, _)| self.scene.triangle_primitive[point.triangle as usize]);
         let strength = steering.tint * steering.intensity;
         let painted = self.mesh.albedo.as_ref().map(|albedo| albedo[triangle]);
@@ -180,8 +185,8 @@ impl AuthoredLights<'_> {
         spread_over(corners, self.options.tests_per_light)
             .filter_map(|p| self.visible.nearest(p, normal.as_vec3()))
             .map(|(triangle, position)| {
-                let surface_corners =
-                    self.scene.triangles[triangle as usize].map(|v| self.scene.positions[v as usize].as_dvec3());
+                let surface_corners = self.scene.triangles[triangle as usize]
+                    .map(|v| self.scene.positions[v as usize].as_dvec3());
                 let barycentric = barycentric(surface_corners, position.as_dvec3()).as_vec3();
                 let surface = self.scene.albedo_at(triangle as usize, barycentric, area as f32);
                 let point = SurfacePoint {
@@ -198,7 +203,12 @@ impl AuthoredLights<'_> {
     }
 
     /// Every n-th of the points, equal shares. The mesh's own colour, where it has a material, replaces the surface's.
-    fn samples(&self, own: &[(SurfacePoint, Vec3)], painted: Option<Vec3>, strength: Vec3) -> Vec<WorldSample> {
+    fn samples(
+        &self,
+        own: &[(SurfacePoint, Vec3)],
+        painted: Option<Vec3>,
+        strength: Vec3,
+    ) -> Vec<WorldSample> {
         let stride = own.len().div_ceil(self.options.samples.max(1) as usize).max(1);
         let chosen = own.iter().step_by(stride);
         let share = 1.0 / chosen.len().max(1) as f32;

@@ -93,7 +93,14 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let lights = refine(&mesh, &density, (options.lights as usize).saturating_sub(authored_count));
 
     clock.stage("samples");
-    let sources = Sources { scene, patches: &patches, mesh: &mesh, tags: &tags.faces, points: &points, standing: &standing };
+    let sources = Sources {
+        scene,
+        patches: &patches,
+        mesh: &mesh,
+        tags: &tags.faces,
+        points: &points,
+        standing: &standing,
+    };
     let mut lights = samples(&sources, &lights, options.samples);
 
     clock.stage("authored");

@@ -124,12 +124,15 @@ impl SimplifierInput {
         let run = |indices: &[u32], target: usize, limit: f32, options: SimplifyOptions| {
             let mut error = 0.0;
             let target = (target * 3).min(indices.len());
-            let shorter = meshopt::simplify_decoder(indices, &self.positions, target, limit, options, Some(&mut error));
+            let shorter =
+                meshopt::simplify_decoder(indices, &self.positions, target, limit, options, Some(&mut error));
             (shorter, error)
         };
         let (mut indices, mut error) = run(&self.indices, 0, free_error, SimplifyOptions::RegularizeLight);
         // First within the topology; only a budget that this cannot meet removes whole islands.
-        for options in [SimplifyOptions::RegularizeLight, SimplifyOptions::RegularizeLight | SimplifyOptions::Prune] {
+        for options in
+            [SimplifyOptions::RegularizeLight, SimplifyOptions::RegularizeLight | SimplifyOptions::Prune]
+        {
             if indices.len() > target * 3 {
                 let (shorter, further) = run(&indices, target, f32::MAX, options);
                 (indices, error) = (shorter, error.max(further));
@@ -147,7 +150,11 @@ impl SimplifierInput {
                 region: self.vertex_region[corners[0] as usize],
                 back: false,
             })
-            .filter(|f| f.vertices[0] != f.vertices[1] && f.vertices[1] != f.vertices[2] && f.vertices[2] != f.vertices[0])
+            .filter(|f| {
+                f.vertices[0] != f.vertices[1]
+                    && f.vertices[1] != f.vertices[2]
+                    && f.vertices[2] != f.vertices[0]
+            })
             .collect();
         LightMesh { positions: patches.positions.clone(), faces }
     }

@@ -11,7 +11,7 @@ use glam::{DVec3, Vec3, Vec3A};
 use rayon::prelude::*;
 use std::f32::consts::PI;
 
-use crate::bvh::triangle::closest_point;
+use crate::bvh::nearest::closest_point;
 use crate::decimate::LightMesh;
 use crate::patches::Patches;
 use crate::refine::Lights;
@@ -180,7 +180,8 @@ fn spread<'a>(candidates: &[Candidate<'a>], count: usize) -> Vec<Candidate<'a>> 
     let mut away: Vec<f64> = candidates.iter().map(|c| -c.point.position.distance_squared(centre)).collect();
     let mut chosen: Vec<Candidate> = Vec::with_capacity(count);
     while chosen.len() < count.min(candidates.len()) {
-        let Some(next) = (0..candidates.len()).max_by(|&a, &b| away[a].total_cmp(&away[b]).then(b.cmp(&a))) else {
+        let Some(next) = (0..candidates.len()).max_by(|&a, &b| away[a].total_cmp(&away[b]).then(b.cmp(&a)))
+        else {
             break;
         };
         let first = chosen.is_empty();

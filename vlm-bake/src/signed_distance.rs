@@ -64,7 +64,9 @@ impl<'a> IslandDistance<'a> {
         let t = triangle as usize;
         let [a, b, c] = self.patches.corners(t).map(|p| p - self.islands.origin());
         let n = (b - a).cross(c - a);
-        let beside = |from: DVec3, to: DVec3| (to - from).cross(local - from).dot(n) <= ON_FEATURE * n.length_squared();
+        let beside = |from: DVec3, to: DVec3| {
+            (to - from).cross(local - from).dot(n) <= ON_FEATURE * n.length_squared()
+        };
         // Zero weight of corner 0 means: on the edge opposite to it, and so on.
         let zero = [beside(b, c), beside(c, a), beside(a, b)];
         let feature = match zero {

@@ -55,7 +55,9 @@ pub fn aspect_ratio(p: [glam::DVec3; 3]) -> f64 {
 #[must_use]
 pub fn barycentric([a, b, c]: [glam::DVec3; 3], p: glam::DVec3) -> glam::DVec3 {
     let normal = (b - a).cross(c - a);
-    let weigh = |from: glam::DVec3, to: glam::DVec3| (to - from).cross(p - from).dot(normal) / normal.length_squared();
+    let weigh = |from: glam::DVec3, to: glam::DVec3| {
+        (to - from).cross(p - from).dot(normal) / normal.length_squared()
+    };
     let weights = glam::DVec3::new(weigh(b, c), weigh(c, a), weigh(a, b));
     if weights.is_finite() { weights } else { glam::DVec3::splat(1.0 / 3.0) }
 }
