@@ -4,7 +4,9 @@
 //! 2 it could not run.
 
 mod error;
+mod input;
 mod progress;
+mod bake;
 mod render;
 
 use std::process::ExitCode;
@@ -22,12 +24,15 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Bake Virtual Light Meshes into a glTF file
+    Bake(bake::BakeArgs),
     /// Render a picture on the CPU
     Render(render::RenderArgs),
 }
 
 fn main() -> ExitCode {
     let result: Result<(), CliError> = match Cli::parse().command {
+        Command::Bake(args) => bake::run(&args),
         Command::Render(args) => render::run(&args),
     };
     match result {

@@ -1,16 +1,16 @@
 //! `vlm render`: a picture of a glTF, lit directly and by one bounce.
 
-use std::io::{Read, stdin};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use vlm_bake::picture::{write_irradiance, write_png};
 use vlm_bake::progress::Progress;
 use vlm_bake::render::{Method, RenderOptions, RenderReport, Rendering, render};
 use vlm_bake::scene::{LoadOptions, load};
-use vlm_format::{GltfFile, read_vlm};
+use vlm_format::read_vlm;
 
 use crate::error::CliError;
+use crate::input::open;
 use crate::progress::Bars;
 
 /// Flags of `vlm render`.
@@ -102,15 +102,6 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
         eprintln!("note: {}: {note}", file.name());
     }
     print_report(args, &report, exposure)
-}
-
-fn open(input: &Path) -> Result<GltfFile, CliError> {
-    if input != Path::new("-") {
-        return Ok(GltfFile::open(input)?);
-    }
-    let mut bytes = Vec::new();
-    stdin().lock().read_to_end(&mut bytes).map_err(|e| CliError::usage(format!("standard input: {e}")))?;
-    Ok(GltfFile::from_slice(&bytes, "standard input", None)?)
 }
 
 /// Writes what was asked for; returns the picture's exposure.
