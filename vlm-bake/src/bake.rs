@@ -93,8 +93,6 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
         Evidence { patches: &patches, mesh: &mesh, points: &points, standing: &of_lights, distance: &distance, clearance };
     sink(&mut lights, &evidence, deepest);
     let violations = verify(&lights, &evidence);
-    eprintln!("viol {} pokes {} deepest {deepest} pts {}", violations.len(), violations.iter().filter(|v| v.pokes_out).count(), violations.iter().map(|v| v.points).sum::<u32>());
-    let mut h = [0;6]; for v in &violations { h[(v.points.min(20) as usize + 3)/4] += 1; } eprintln!("{h:?}");
 
     clock.stage("tag");
     let mut tags = tag(scene, &patches, &mesh, &lights, &violations);

@@ -13,7 +13,7 @@ use crate::topology::cross_of;
 /// A face stands only for points whose normal is at most this far (cosine) from its own. Lower values let a face stand
 /// for the side walls of what was decimated away, which it can never clear; higher values leave more of the surface without
 /// a light.
-const LEAST_COSINE: f64 = 0.3;
+const LEAST_COSINE: f64 = 0.8;
 
 /// A point on the visible surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
