@@ -1,4 +1,9 @@
 //! Metrics, comparison methods and benchmarks.
 
 pub mod assets;
+pub mod glb;
+pub mod cornell;
 pub mod sample_asset;
+pub mod scenes;
+pub mod metrics;
+pub mod thesis;

@@ -96,7 +96,7 @@ fn lost_and_doubled_references_are_named() {
     assert_stale(lose, &["`vlm-1`: no node refers to it any more"]);
     let double = |json: &mut Value| json["nodes"][3]["extensions"] = json["nodes"][1]["extensions"].clone();
     assert_stale(double, &["`vlm-1`: both `Room/Table` and `Spare` refer to it"]);
-    let unknown = |json: &mut Value| json["nodes"][3]["extensions"] = json!({ EXTENSION: { "vlm": "x" } });
+    let unknown = |json: &mut Value| json["nodes"][3]["extensions"] = json!({ EXTENSION: { "vlms": ["x"] } });
     assert_stale(unknown, &["`x`: `Spare` refers to it, but it does not exist"]);
     let root = |json: &mut Value| drop(json["extensions"].as_object_mut().unwrap().remove(EXTENSION));
     assert_stale(root, &["`Room/Table` refers to a VLM, but another tool removed the root object"]);

@@ -1,0 +1,112 @@
+//! Phase 2: the irradiance that a list of virtual lights gives to a point.
+
+use glam::Vec3;
+
+use super::form_factor::{LightGeometry, form_factor};
+use super::upload::LightSet;
+
+/// A shaded point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Receiver {
+    /// Metres, world space.
+    pub position: Vec3,
+    /// Unit shading normal: cosines use it.
+    pub normal: Vec3,
+    /// Unit normal of the surface itself: no light comes from behind it.
+    pub geometric_normal: Vec3,
+    /// 0 for none; lights of the same tag are skipped.
+    pub tag: u32,
+}
+
+/// What a list of lights gives to a point, and what that took.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Gathered {
+    /// Indirect irradiance, lx.
+    pub irradiance: Vec3,
+    /// Lights whose geometry was read: those of the list that are neither black nor of the receiver's tag.
+    pub pairs: u64,
+}
+
+/// `E(x) = sum over the listed lights of F * B`; `radiosity` is phase 1's result, one per light, lx.
+#[must_use]
+pub fn gather(
+    lights: &LightSet,
+    radiosity: &[Vec3],
+    list: impl IntoIterator<Item = u32>,
+    receiver: &Receiver,
+) -> Gathered {
+    let mut gathered = Gathered::default();
+    for light in list {
+        let light = light as usize;
+        let Some((geometry, &radiosity)) = lights.geometry.get(light).zip(radiosity.get(light)) else {
+            continue;
+        };
+        let tag = lights.tags.get(light).copied().unwrap_or(0);
+        if radiosity == Vec3::ZERO || (tag != 0 && tag == receiver.tag) {
+            continue;
+        }
+        gathered.pairs += 1;
+        if !is_behind(geometry, receiver) {
+            let form_factor = form_factor(geometry, receiver.position, receiver.normal);
+            gathered.irradiance += radiosity * form_factor as f32;
+        }
+    }
+    gathered
+}
+
+/// True if the whole light lies behind the receiver's surface.
+fn is_behind(light: &LightGeometry, receiver: &Receiver) -> bool {
+    let r0 = light.v0 - receiver.position;
+    let height = |r: Vec3| r.dot(receiver.geometric_normal);
+    height(r0) <= 0.0 && height(r0 + light.e1) <= 0.0 && height(r0 + light.e2) <= 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    fn lights(tags: Vec<u32>) -> LightSet {
+        let light = LightGeometry::new([
+            DVec3::new(0.0, 0.0, 1.0),
+            DVec3::new(0.0, 1.0, 1.0),
+            DVec3::new(1.0, 0.0, 1.0),
+        ]);
+        LightSet {
+            geometry: vec![light; tags.len()],
+            emission: vec![Vec3::ZERO; tags.len()],
+            sample_starts: vec![0; tags.len() + 1],
+            samples: Vec::new(),
+            tags,
+        }
+    }
+
+    fn receiver(tag: u32) -> Receiver {
+        Receiver { position: Vec3::ZERO, normal: Vec3::Z, geometric_normal: Vec3::Z, tag }
+    }
+
+    #[test]
+    fn tags_and_black_lights_are_skipped() {
+        let lights = lights(vec![0, 7, 0]);
+        let radiosity = [Vec3::ONE, Vec3::ONE, Vec3::ZERO];
+        let untagged = gather(&lights, &radiosity, 0..3, &receiver(0));
+        let tagged = gather(&lights, &radiosity, 0..3, &receiver(7));
+        let other = gather(&lights, &radiosity, 0..3, &receiver(8));
+        assert_eq!((untagged.pairs, tagged.pairs, other.pairs), (2, 1, 2));
+        assert!((untagged.irradiance - 2.0 * tagged.irradiance).length() < 1e-6);
+        assert_eq!(untagged, other);
+        assert!(tagged.irradiance.x > 0.05);
+    }
+
+    #[test]
+    fn nothing_comes_from_behind_the_surface() {
+        let lights = lights(vec![0]);
+        let behind = Receiver { geometric_normal: -Vec3::Z, ..receiver(0) };
+        assert_eq!(gather(&lights, &[Vec3::ONE], 0..1, &behind).irradiance, Vec3::ZERO);
+    }
+
+    #[test]
+    fn numbers_out_of_range_add_nothing() {
+        assert_eq!(gather(&lights(vec![0]), &[Vec3::ONE], [1, u32::MAX], &receiver(0)), Gathered::default());
+    }
+}

@@ -1,0 +1,104 @@
+//! Renderings as files: PNG to look at, EXR to measure.
+
+use std::f32::consts::PI;
+use std::io::{Cursor, Write};
+use std::path::{Path, PathBuf};
+
+use glam::Vec3;
+use image::{ImageFormat, Rgb, Rgb32FImage, RgbImage};
+use vlm_shaders::cpu::resolve::{auto_exposure, encode_srgb, tone_map};
+
+use crate::gbuffer::GBuffer;
+use crate::render::Rendering;
+
+/// Shown where nothing is hit, sRGB.
+const BACKGROUND: [u8; 3] = [24, 26, 30];
+
+/// Why a picture was not written.
+#[derive(Debug, thiserror::Error)]
+pub enum PictureError {
+    /// The pixels could not be encoded.
+    #[error("{path}: the picture could not be encoded: {source}", path = path.display())]
+    Encode {
+        /// The file that was to be written.
+        path: PathBuf,
+        /// The encoder's reason.
+        source: image::ImageError,
+    },
+    /// The file could not be written.
+    #[error("{path}: could not be written: {source}; is the folder there, writable, and the disk not full?", path = path.display())]
+    Write {
+        /// The file that was to be written.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+}
+
+/// Radiance that leaves each pixel's surface, nt: `L_e + albedo / pi * (direct + indirect irradiance)`.
+#[must_use]
+pub fn radiance(rendering: &Rendering) -> Vec<Vec3> {
+    let light = rendering.direct.iter().zip(&rendering.indirect);
+    let pixels = rendering.gbuffer.points.iter().zip(light);
+    let radiance = pixels.map(|(point, (&direct, &indirect))| {
+        point.as_ref().map_or(Vec3::ZERO, |p| p.emission + p.albedo / PI * (direct + indirect))
+    });
+    radiance.collect()
+}
+
+/// Writes the shown picture, tone mapped, and returns the exposure: what radiance in nt was multiplied by. Without a
+/// given one it is chosen so that the mean brightness (geometric) shows as middle grey.
+///
+/// # Errors
+/// If the file cannot be encoded or written; then no partial file is left.
+pub fn write_png(rendering: &Rendering, path: &Path, exposure: Option<f32>) -> Result<f32, PictureError> {
+    let radiance = radiance(rendering);
+    let exposure = exposure.unwrap_or_else(|| auto_exposure(radiance.iter().copied()));
+    let GBuffer { width, height, points } = &rendering.gbuffer;
+    let image = RgbImage::from_fn(*width, *height, |x, y| {
+        let pixel = y as usize * *width as usize + x as usize;
+        let shown = radiance.get(pixel).filter(|_| matches!(points.get(pixel), Some(Some(_))));
+        Rgb(shown.map_or(BACKGROUND, |&radiance| encode_srgb(tone_map(radiance * exposure))))
+    });
+    let mut file = Cursor::new(Vec::new());
+    let encoded = image.write_to(&mut file, ImageFormat::Png);
+    encoded.map_err(|source| PictureError::Encode { path: path.to_owned(), source })?;
+    write_whole(path, file.get_ref())?;
+    Ok(exposure)
+}
+
+/// Writes the indirect irradiance in lx as RGB float32; 0 where nothing is hit.
+///
+/// # Errors
+/// If the file cannot be encoded or written; then no partial file is left.
+pub fn write_irradiance(rendering: &Rendering, path: &Path) -> Result<(), PictureError> {
+    let GBuffer { width, height, .. } = rendering.gbuffer;
+    let image = Rgb32FImage::from_fn(width, height, |x, y| {
+        let pixel = y as usize * width as usize + x as usize;
+        Rgb(rendering.indirect.get(pixel).copied().unwrap_or_default().to_array())
+    });
+    let mut file = Cursor::new(Vec::new());
+    let encoded = image.write_to(&mut file, ImageFormat::OpenExr);
+    encoded.map_err(|source| PictureError::Encode { path: path.to_owned(), source })?;
+    write_whole(path, file.get_ref())
+}
+
+/// Reads what [`write_irradiance`] wrote: width, height, and RGB rows from the top.
+///
+/// # Errors
+/// If the file cannot be read or is not an image.
+pub fn read_irradiance(path: &Path) -> Result<(u32, u32, Vec<Vec3>), image::ImageError> {
+    let image = image::open(path)?.into_rgb32f();
+    let pixels = image.pixels().map(|&Rgb(rgb)| Vec3::from(rgb)).collect();
+    Ok((image.width(), image.height(), pixels))
+}
+
+/// Writes beside the file, then renames: nobody ever sees half of it.
+fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), PictureError> {
+    let error = |source| PictureError::Write { path: path.to_owned(), source };
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(error)?;
+    file.write_all(bytes).map_err(error)?;
+    file.persist(path).map_err(|e| error(e.error))?;
+    Ok(())
+}

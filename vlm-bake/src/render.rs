@@ -1,0 +1,254 @@
+//! Pictures on the CPU: direct light, and indirect light by path tracing or by virtual lights.
+
+use std::time::Instant;
+
+use glam::{DMat4, Vec3};
+use rayon::prelude::*;
+use serde::Serialize;
+use vlm_format::VlmAsset;
+use vlm_shaders::cpu::gather::{Gathered, Receiver, gather};
+use vlm_shaders::cpu::grid::lights_at;
+use vlm_shaders::cpu::inject::inject;
+use vlm_shaders::cpu::upload::LightSet;
+
+use crate::gbuffer::GBuffer;
+use crate::reference::{Progress, indirect_irradiance};
+use crate::scene::{Camera, Scene};
+use crate::shade::TraceScene;
+
+/// Below this many lights, looking up a cell's list costs more than the lights that it leaves out.
+const FEWEST_LIGHTS_FOR_GRID: usize = 40;
+
+/// The largest picture, pixels: one that fits in memory with room to spare.
+const MOST_PIXELS: u64 = 1 << 28;
+
+/// How the indirect light is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// No indirect light.
+    Direct,
+    /// One bounce by path tracing: the truth, and slow. Needs no lights.
+    Reference,
+    /// The exact form factor of every light at every pixel; no occlusion.
+    Brute,
+    /// The lights of each point's grid cell; every light without a grid or with few lights.
+    #[default]
+    Vlm,
+}
+
+/// What picture to make.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RenderOptions {
+    /// Pixels, above 0.
+    pub width: u32,
+    /// Pixels, above 0.
+    pub height: u32,
+    /// How the indirect light is found.
+    pub method: Method,
+    /// Directions per pixel of `reference`. Four times as many halve the noise or better, and take four times as long.
+    pub samples: u32,
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self { width: 640, height: 480, method: Method::default(), samples: 256 }
+    }
+}
+
+/// A finished picture, as the light that it is made of. Arrays have one element per pixel, row 0 at the top.
+#[derive(Clone, Debug, Default)]
+pub struct Rendering {
+    /// What each pixel shows.
+    pub gbuffer: GBuffer,
+    /// Direct irradiance, lx; 0 where nothing is hit.
+    pub direct: Vec<Vec3>,
+    /// Indirect irradiance, lx; 0 where nothing is hit.
+    pub indirect: Vec<Vec3>,
+    /// What it took.
+    pub stats: RenderStats,
+}
+
+/// What a picture took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct RenderStats {
+    /// Wall time of the two phases.
+    pub seconds: PhaseSeconds,
+    /// Pairs of a pixel and a light whose geometry was read.
+    pub pairs_evaluated: u64,
+    /// Lights of the asset.
+    pub lights: u32,
+}
+
+/// Wall time, seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct PhaseSeconds {
+    /// Phase 1: direct light at the samples.
+    pub inject: f64,
+    /// Phase 2, or the path tracing of `reference`.
+    pub gather: f64,
+}
+
+/// Why there is no picture.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RenderError {
+    /// The method needs virtual lights.
+    #[error(
+        "there is no Virtual Light Mesh to render: bake one first, or use the methods `direct` or `reference`"
+    )]
+    NoLights,
+    /// The picture would have no pixels or far too many.
+    #[error(
+        "a picture of {width} x {height} pixels cannot be made: ask for 1 to {MOST_PIXELS} pixels in all"
+    )]
+    Size {
+        /// Asked width, pixels.
+        width: u32,
+        /// Asked height, pixels.
+        height: u32,
+    },
+    /// A VLM belongs to a node without geometry in this scene.
+    #[error(
+        "the VLM {id:?} belongs to node {node}, which has no geometry in this scene: bake the file again"
+    )]
+    UnknownNode {
+        /// The VLM's id.
+        id: String,
+        /// Index of the glTF node.
+        node: u32,
+    },
+}
+
+/// Renders `scene` from `camera`. `asset` holds the virtual lights; `direct` and `reference` do without.
+///
+/// # Errors
+/// For an impossible size, missing lights, and lights of nodes that the scene does not have.
+pub fn render(
+    scene: &Scene,
+    asset: Option<&VlmAsset>,
+    camera: &Camera,
+    options: &RenderOptions,
+    progress: Progress<'_>,
+) -> Result<Rendering, RenderError> {
+    check_size(options)?;
+    let trace = TraceScene::new(scene);
+    let gbuffer = GBuffer::trace(&trace, camera, options.width, options.height);
+    let direct = gbuffer.direct_irradiance(&trace);
+    let lights = asset.map_or(0, |asset| asset.triangles.len() as u32);
+    let (indirect, stats) = match options.method {
+        Method::Direct => (vec![Vec3::ZERO; direct.len()], RenderStats { lights, ..RenderStats::default() }),
+        Method::Reference => {
+            let start = Instant::now();
+            let indirect =
+                indirect_irradiance(&trace, &gbuffer.points, options.width, options.samples, progress);
+            let seconds = PhaseSeconds { inject: 0.0, gather: start.elapsed().as_secs_f64() };
+            (indirect, RenderStats { seconds, pairs_evaluated: 0, lights })
+        }
+        Method::Brute => gather_brute(&trace, asset.ok_or(RenderError::NoLights)?, &gbuffer)?,
+        Method::Vlm => gather_by_grid(&trace, asset.ok_or(RenderError::NoLights)?, &gbuffer)?,
+    };
+    Ok(Rendering { gbuffer, direct, indirect, stats })
+}
+
+fn check_size(options: &RenderOptions) -> Result<(), RenderError> {
+    let &RenderOptions { width, height, .. } = options;
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels == 0 || pixels > MOST_PIXELS { Err(RenderError::Size { width, height }) } else { Ok(()) }
+}
+
+fn gather_brute(
+    trace: &TraceScene<'_>,
+    asset: &VlmAsset,
+    gbuffer: &GBuffer,
+) -> Result<(Vec<Vec3>, RenderStats), RenderError> {
+    let lit = LitScene::new(trace, asset)?;
+    let all = 0..lit.lights.len() as u32;
+    Ok(lit.gather(gbuffer, |receiver| gather(&lit.lights, &lit.radiosity, all.clone(), receiver)))
+}
+
+fn gather_by_grid(
+    trace: &TraceScene<'_>,
+    asset: &VlmAsset,
+    gbuffer: &GBuffer,
+) -> Result<(Vec<Vec3>, RenderStats), RenderError> {
+    let Some(grid) = asset.grid.as_ref().filter(|_| asset.triangles.len() >= FEWEST_LIGHTS_FOR_GRID) else {
+        return gather_brute(trace, asset, gbuffer);
+    };
+    let lit = LitScene::new(trace, asset)?;
+    Ok(lit.gather(gbuffer, |receiver| {
+        let list = lights_at(grid, receiver.position).iter().copied();
+        gather(&lit.lights, &lit.radiosity, list, receiver)
+    }))
+}
+
+/// The virtual lights of an asset after phase 1: what every gathering method starts from.
+pub struct LitScene<'a> {
+    /// The lights in world space.
+    pub lights: LightSet,
+    /// Phase 1's result: radiosity of each light, lx.
+    pub radiosity: Vec<Vec3>,
+    /// Wall time of phase 1.
+    pub inject_seconds: f64,
+    /// Tag of each of the scene's primitives, 0 for none.
+    primitive_tags: Vec<u32>,
+    scene: &'a Scene,
+}
+
+impl<'a> LitScene<'a> {
+    /// Moves the lights into world space and runs phase 1.
+    ///
+    /// # Errors
+    /// [`RenderError::UnknownNode`] if a VLM belongs to a node that the scene does not have.
+    pub fn new(trace: &TraceScene<'a>, asset: &VlmAsset) -> Result<Self, RenderError> {
+        let lights = world_lights(trace.scene, asset)?;
+        let start = Instant::now();
+        let radiosity = inject(&lights, |position, normal| trace.direct_irradiance(position, normal, normal));
+        let inject_seconds = start.elapsed().as_secs_f64();
+        let primitive_tags = primitive_tags(trace.scene, asset);
+        Ok(Self { lights, radiosity, inject_seconds, primitive_tags, scene: trace.scene })
+    }
+
+    /// Phase 2 at every pixel by `gather`: indirect irradiance in lx, and what it took.
+    pub fn gather(
+        &self,
+        gbuffer: &GBuffer,
+        gather: impl Fn(&Receiver) -> Gathered + Sync,
+    ) -> (Vec<Vec3>, RenderStats) {
+        let start = Instant::now();
+        let gathered = gbuffer.points.par_iter().map(|point| {
+            let Some(point) = point else { return Gathered::default() };
+            gather(&Receiver {
+                position: point.position,
+                normal: point.normal,
+                geometric_normal: point.geometric_normal,
+                tag: self.tag(point.triangle),
+            })
+        });
+        let gathered: Vec<Gathered> = gathered.collect();
+        let seconds = PhaseSeconds { inject: self.inject_seconds, gather: start.elapsed().as_secs_f64() };
+        let pairs_evaluated = gathered.iter().map(|g| g.pairs).sum();
+        let stats = RenderStats { seconds, pairs_evaluated, lights: self.lights.len() as u32 };
+        (gathered.iter().map(|g| g.irradiance).collect(), stats)
+    }
+
+    fn tag(&self, triangle: u32) -> u32 {
+        let primitive = self.scene.triangle_primitive.get(triangle as usize);
+        primitive.and_then(|&p| self.primitive_tags.get(p as usize)).copied().unwrap_or(0)
+    }
+}
+
+fn world_lights(scene: &Scene, asset: &VlmAsset) -> Result<LightSet, RenderError> {
+    let transform = |node: u32| scene.objects.iter().find(|o| o.node == node).map(|o| o.world_from_node);
+    for vlm in &asset.vlms {
+        transform(vlm.node).ok_or(RenderError::UnknownNode { id: vlm.id.clone(), node: vlm.node })?;
+    }
+    Ok(LightSet::new(asset, |node| transform(node).unwrap_or(DMat4::IDENTITY)))
+}
+
+fn primitive_tags(scene: &Scene, asset: &VlmAsset) -> Vec<u32> {
+    let tag = |mesh: u32, primitive: u32| {
+        let found = asset.primitive_tags.binary_search_by_key(&(mesh, primitive), |&(m, p, _)| (m, p));
+        found.ok().and_then(|i| asset.primitive_tags.get(i)).map_or(0, |&(_, _, tag)| tag)
+    };
+    scene.primitives.iter().map(|p| tag(p.mesh, p.primitive)).collect()
+}

@@ -1,0 +1,176 @@
+//! A scene ready for rays: what they meet, what colour it has there, and the direct light on it.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+use vlm_shaders::cpu::punctual;
+
+use crate::bvh::{Bvh, Hit};
+use crate::scene::{self, PunctualKind, Scene};
+
+/// What rays must know of a scene, indexed by triangle, with the tree over its triangles.
+pub struct TraceScene<'a> {
+    /// The scene itself.
+    pub scene: &'a Scene,
+    /// The tree over [`Scene::triangles`].
+    pub bvh: Bvh,
+    /// The punctual lights.
+    pub lights: Vec<punctual::PunctualLight>,
+    sides: Vec<Sides>,
+}
+
+/// How a triangle meets rays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sides {
+    /// Rays pass: alpha blending and transmission. Light transport here knows only opaque surfaces.
+    None,
+    /// The counter-clockwise side reflects; the other is black.
+    Front,
+    /// Both sides reflect.
+    Both,
+}
+
+/// A point of a visible surface, on the side from which it was seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// Index into [`Scene::triangles`].
+    pub triangle: u32,
+    /// Metres, world space.
+    pub position: Vec3,
+    /// Unit shading normal on the seen side.
+    pub normal: Vec3,
+    /// Unit normal of the triangle on the seen side.
+    pub geometric_normal: Vec3,
+    /// Linear albedo, 0 to 1.
+    pub albedo: Vec3,
+    /// Emitted radiance, nt.
+    pub emission: Vec3,
+}
+
+impl<'a> TraceScene<'a> {
+    /// Builds the tree; about a second per million triangles.
+    #[must_use]
+    pub fn new(scene: &'a Scene) -> Self {
+        let sides = scene.triangle_primitive.iter().map(|&primitive| sides_of(scene, primitive)).collect();
+        let lights = scene.lights.iter().map(punctual_light).collect();
+        Self { scene, bvh: Bvh::new(&scene.positions, &scene.triangles), lights, sides }
+    }
+
+    /// The first surface that a camera ray shows: it passes through backs of single-sided surfaces (culling).
+    #[must_use]
+    pub fn camera_hit(&self, origin: Vec3, direction: Vec3) -> Option<Hit> {
+        let shows = |hit: &Hit| match self.sides(hit.triangle) {
+            Sides::None => false,
+            Sides::Front => hit.front,
+            Sides::Both => true,
+        };
+        self.bvh.hit_where(origin, direction, f32::INFINITY, shows)
+    }
+
+    /// The first surface that a light path meets, whichever side it shows.
+    #[must_use]
+    pub fn path_hit(&self, origin: Vec3, direction: Vec3) -> Option<Hit> {
+        self.bvh.hit_where(origin, direction, f32::INFINITY, |hit| self.is_opaque(hit))
+    }
+
+    /// True if the side on which `hit` lies reflects and emits.
+    #[must_use]
+    pub fn is_lit_side(&self, hit: &Hit) -> bool {
+        hit.front || self.sides(hit.triangle) == Sides::Both
+    }
+
+    /// The surface at a hit, on the side that the ray meets. `footprint` is the area over which textures are averaged,
+    /// square metres.
+    #[must_use]
+    pub fn surface(&self, hit: &Hit, footprint: f32) -> Option<SurfacePoint> {
+        let scene = self.scene;
+        let corners = *scene.triangles.get(hit.triangle as usize)?;
+        let weights = hit.barycentric.to_array();
+        let interpolate = |values: &[Vec3]| -> Vec3 {
+            let terms = corners.iter().zip(weights);
+            terms.map(|(&i, w)| values.get(i as usize).copied().unwrap_or_default() * w).sum()
+        };
+        let [p0, p1, p2] = corners.map(|i| scene.positions.get(i as usize).copied().unwrap_or_default());
+        let side = if hit.front { 1.0 } else { -1.0 };
+        let geometric_normal = (p1 - p0).cross(p2 - p0).try_normalize()? * side;
+        let normal =
+            interpolate(&scene.vertex_normals).try_normalize().map_or(geometric_normal, |n| n * side);
+        let (albedo, emission) = self.colors(hit, footprint);
+        let position = interpolate(&scene.positions);
+        Some(SurfacePoint { triangle: hit.triangle, position, normal, geometric_normal, albedo, emission })
+    }
+
+    /// Irradiance by the punctual lights with hard shadows, lx. Every opaque surface casts shadows, whichever side it
+    /// shows, and no light comes from behind the geometric normal.
+    #[must_use]
+    pub fn direct_irradiance(&self, position: Vec3, normal: Vec3, geometric_normal: Vec3) -> Vec3 {
+        let origin = self.bvh.leave(position, geometric_normal);
+        let arriving = |light: &punctual::PunctualLight| {
+            let incident = light.incident(position)?;
+            let cosine = normal.dot(incident.direction);
+            if cosine <= 0.0 || geometric_normal.dot(incident.direction) <= 0.0 {
+                return None;
+            }
+            let visible = if light.directional {
+                !self.is_occluded(origin, incident.direction, f32::INFINITY)
+            } else {
+                !self.is_occluded(origin, light.position - origin, 1.0)
+            };
+            visible.then_some(incident.facing_irradiance * cosine)
+        };
+        self.lights.iter().filter_map(arriving).sum()
+    }
+
+    /// Radiosity of a surface point by direct light and its own emission, lx: `albedo * E + pi * L_e`.
+    #[must_use]
+    pub fn radiosity(&self, point: &SurfacePoint) -> Vec3 {
+        let emitted = point.emission * PI;
+        if point.albedo == Vec3::ZERO {
+            return emitted;
+        }
+        point.albedo * self.direct_irradiance(point.position, point.normal, point.geometric_normal) + emitted
+    }
+
+    fn is_occluded(&self, origin: Vec3, direction: Vec3, max_distance: f32) -> bool {
+        self.bvh.occluded_where(origin, direction, max_distance, |hit| self.is_opaque(hit))
+    }
+
+    fn is_opaque(&self, hit: &Hit) -> bool {
+        self.sides(hit.triangle) != Sides::None
+    }
+
+    fn sides(&self, triangle: u32) -> Sides {
+        self.sides.get(triangle as usize).copied().unwrap_or(Sides::Front)
+    }
+
+    fn colors(&self, hit: &Hit, footprint: f32) -> (Vec3, Vec3) {
+        let _ = footprint;
+        let scene = self.scene;
+        let primitive = scene.triangle_primitive.get(hit.triangle as usize);
+        let primitive = primitive.and_then(|&p| scene.primitives.get(p as usize));
+        let material = primitive.and_then(|p| scene.materials.get(p.material as usize));
+        material.map_or((Vec3::ZERO, Vec3::ZERO), |m| (m.base_color, m.emission))
+    }
+}
+
+fn sides_of(scene: &Scene, primitive: u32) -> Sides {
+    let material = scene.primitives.get(primitive as usize).map(|p| p.material as usize);
+    match material.and_then(|m| scene.materials.get(m)) {
+        Some(material) if !material.reflects => Sides::None,
+        Some(material) if material.two_sided => Sides::Both,
+        _ => Sides::Front,
+    }
+}
+
+fn punctual_light(light: &scene::PunctualLight) -> punctual::PunctualLight {
+    let point = punctual::PunctualLight {
+        direction: light.direction,
+        range: light.range,
+        ..punctual::PunctualLight::point(light.position, light.intensity)
+    };
+    match light.kind {
+        PunctualKind::Point => point,
+        PunctualKind::Directional => punctual::PunctualLight { directional: true, ..point },
+        PunctualKind::Spot { cos_inner, cos_outer } => point.with_cone(cos_inner, cos_outer),
+    }
+}
