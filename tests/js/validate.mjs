@@ -5,7 +5,6 @@ import { readFile } from "node:fs/promises";
 import path from "node:path";
 import validator from "gltf-validator";
 
-
 async function validate(file) {
   const report = await validator.validateBytes(new Uint8Array(await readFile(file)), {
     uri: path.basename(file),

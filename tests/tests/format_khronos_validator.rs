@@ -86,3 +86,8 @@ fn a_broken_file_has_errors() {
     let codes: Vec<&Value> = errors(&reports[0]).iter().map(|message| &message["code"]).collect();
     assert!(codes.contains(&&json!("ACCESSOR_TOO_LONG")), "{codes:?}");
 }
+
+#[test]
+fn the_validator_is_there_where_it_is_promised() {
+    has_validator();
+}
