@@ -1,5 +1,7 @@
 //! Bad and extreme input: one clear error with file, place, cause and remedy, or none at all.
 
+#![allow(clippy::unwrap_used, reason = "what cannot be unwrapped fails the test")]
+
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
