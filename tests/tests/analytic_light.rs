@@ -21,7 +21,8 @@ fn mean(indirect: &[Vec3]) -> f64 {
 }
 
 fn indirect(scene: &Scene, asset: &VlmAsset, camera: &Camera, method: Method) -> Vec<Vec3> {
-    let options = RenderOptions { width: SIZE, height: SIZE, method, samples: SAMPLES };
+    let options =
+        RenderOptions { width: SIZE, height: SIZE, method, samples: SAMPLES, ..RenderOptions::default() };
     render(scene, Some(asset), camera, &options, &Silent).unwrap().indirect
 }
 
