@@ -1,6 +1,9 @@
 //! A small valid Virtual Light Mesh for any file: what it says about the scene is nonsense, but every array is in use.
+//! And a small scene to put it in.
 
+use base64::Engine;
 use glam::Vec3;
+use serde_json::json;
 use vlm_format::{GltfFile, Grid, Sample, Settings, Vlm, VlmAsset};
 
 /// Two lights for each of the first two nodes with a mesh, with samples, tags, emission and a grid.
@@ -53,5 +56,54 @@ fn push_quad(asset: &mut VlmAsset, node: u32) {
         asset.tags.push(node);
         asset.samples.push(Sample { position: Vec3::splat(0.1), normal: Vec3::Z, reflectance: Vec3::ONE });
         asset.sample_starts.push(asset.samples.len() as u32);
+    }
+}
+
+/// `Room/Table` with a triangle of vertices (0,0,0), (1,0,0), (0,1,0), `Room/Lamp` with
+/// the same and a light, and `Spare`, a camera.
+///
+/// # Panics
+/// If the library refuses this valid file.
+pub fn room() -> GltfFile {
+    let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    let bytes: Vec<u8> =
+        corners.iter().flat_map(|corner| corner.to_array()).flat_map(f32::to_le_bytes).collect();
+    let data = base64::engine::general_purpose::STANDARD.encode(bytes);
+    let positions = json!({
+        "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0],
+    });
+    let json = json!({
+        "asset": { "version": "2.0" },
+        "scene": 0,
+        "scenes": [{ "nodes": [0] }],
+        "nodes": [
+            { "name": "Room", "children": [1, 2] },
+            { "name": "Table", "mesh": 0, "translation": [1, 0, 0] },
+            { "name": "Lamp", "mesh": 1, "extensions": { "KHR_lights_punctual": { "light": 0 } } },
+            { "name": "Spare", "camera": 0, "extras": { "shelf": [1, 2.5, null] } },
+        ],
+        "cameras": [{ "type": "perspective", "perspective": { "yfov": 1, "znear": 0.1 } }],
+        "meshes": [
+            { "primitives": [{ "attributes": { "POSITION": 0 }, "material": 0 }] },
+            { "primitives": [{ "attributes": { "POSITION": 1 } }] },
+        ],
+        "materials": [{
+            "pbrMetallicRoughness": { "baseColorFactor": [0.5, 0.5, 0.5, 1] },
+            "emissiveTexture": { "index": 0, "extensions": { "KHR_texture_transform": { "offset": [0.5, 0] } } },
+            "alphaMode": "MASK",
+            "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 2 } },
+        }],
+        "textures": [{ "source": 0, "sampler": 0 }],
+        "samplers": [{ "wrapS": 33071, "magFilter": 9728 }],
+        "images": [{ "uri": "data:image/png;base64,iVBORw0KGgo=" }],
+        "extensions": { "KHR_lights_punctual": { "lights": [{ "type": "spot", "spot": { "outerConeAngle": 0.5 } }] } },
+        "extensionsUsed": ["KHR_lights_punctual", "KHR_texture_transform", "KHR_materials_emissive_strength"],
+        "accessors": [positions, positions],
+        "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+        "buffers": [{ "byteLength": 36, "uri": format!("data:application/octet-stream;base64,{data}") }],
+    });
+    match GltfFile::from_slice(json.to_string().as_bytes(), "room.gltf", None) {
+        Ok(file) => file,
+        Err(error) => panic!("{error}"),
     }
 }

@@ -1,59 +1,14 @@
 //! What other tools do to a file after the bake, and what the reader says about it.
 
-use glam::Vec3;
 use serde_json::{Value, json};
 use vlm_format::{Container, EXTENSION, Error, GltfFile, Target, read_vlm, read_vlm_unchecked, write_vlm};
-use vlm_tests::sample_asset;
-
-/// `Room/Table` with a triangle, and `Room/Lamp` with the same.
-fn source() -> GltfFile {
-    let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
-    let bytes: Vec<u8> =
-        corners.iter().flat_map(|corner| corner.to_array()).flat_map(f32::to_le_bytes).collect();
-    let text = bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
-    let json = json!({
-        "asset": { "version": "2.0" },
-        "scene": 0,
-        "scenes": [{ "nodes": [0] }],
-        "nodes": [
-            { "name": "Room", "children": [1, 2] },
-            { "name": "Table", "mesh": 0, "translation": [1, 0, 0] },
-            { "name": "Lamp", "mesh": 1 },
-            { "name": "Spare" },
-        ],
-        "meshes": [
-            { "primitives": [{ "attributes": { "POSITION": 0 }, "material": 0 }] },
-            { "primitives": [{ "attributes": { "POSITION": 1 } }] },
-        ],
-        "materials": [{ "pbrMetallicRoughness": { "baseColorFactor": [0.5, 0.5, 0.5, 1] } }],
-        "accessors": [
-            { "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] },
-            { "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] },
-        ],
-        "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
-        "buffers": [{ "byteLength": 36, "uri": format!("data:application/octet-stream;base64,{}", base64(&text)) }],
-    });
-    GltfFile::from_slice(json.to_string().as_bytes(), "room.gltf", None).unwrap()
-}
-
-/// Base64 of bytes given as hexadecimal digits.
-fn base64(hex: &str) -> String {
-    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let bytes: Vec<u8> =
-        (0..hex.len() / 2).map(|i| u8::from_str_radix(&hex[2 * i..2 * i + 2], 16).unwrap()).collect();
-    let group = |three: &[u8]| {
-        let word = three.iter().fold(0_u32, |word, &byte| word << 8 | u32::from(byte));
-        [18, 12, 6, 0].map(|shift| char::from(DIGITS[(word >> shift) as usize & 63]))
-    };
-    assert!(bytes.len() % 3 == 0, "this encoder has no padding");
-    bytes.chunks(3).flat_map(group).collect()
-}
+use vlm_tests::sample_asset::{quads, room};
 
 fn baked() -> Value {
-    let file = source();
+    let file = room();
     let target =
         Target { container: Container::Gltf { embedded: true }, file_name: String::from("room.gltf") };
-    let outputs = write_vlm(&file, &sample_asset::quads(&file), &target).unwrap();
+    let outputs = write_vlm(&file, &quads(&file), &target).unwrap();
     serde_json::from_slice(&outputs[0].bytes).unwrap()
 }
 
@@ -80,8 +35,8 @@ fn assert_stale(change: impl FnOnce(&mut Value), parts: &[&str]) {
 #[test]
 fn an_untouched_file_is_read() {
     let file = open(&baked());
-    assert_eq!(read_vlm(&file).unwrap(), Some(sample_asset::quads(&source())));
-    assert_eq!(read_vlm(&source()).unwrap(), None);
+    assert_eq!(read_vlm(&file).unwrap(), Some(quads(&room())));
+    assert_eq!(read_vlm(&room()).unwrap(), None);
 }
 
 #[test]
@@ -143,7 +98,7 @@ fn lost_and_doubled_references_are_named() {
     assert_stale(double, &["`vlm-1`: both `Room/Table` and `Spare` refer to it"]);
     let unknown = |json: &mut Value| json["nodes"][3]["extensions"] = json!({ EXTENSION: { "vlm": "x" } });
     assert_stale(unknown, &["`x`: `Spare` refers to it, but it does not exist"]);
-    let root = |json: &mut Value| drop(json.as_object_mut().unwrap().remove("extensions"));
+    let root = |json: &mut Value| drop(json["extensions"].as_object_mut().unwrap().remove(EXTENSION));
     assert_stale(root, &["`Room/Table` refers to a VLM, but another tool removed the root object"]);
 }
 

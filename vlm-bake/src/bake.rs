@@ -27,6 +27,10 @@ use crate::write::{assemble, order, placeable};
 /// A face stands for surface at most this share of the scene's extent away, on top of four times the decimation's error.
 const REACH_SHARE: f64 = 0.02;
 
+/// Lights sink by at most this many times the clearance and the decimation's error together. The error is a root mean
+/// square: single places are off by a few times as much.
+const DEEPEST: f64 = 4.0;
+
 /// The least number of surface points of a bake: small budgets are tested as finely as medium ones.
 const LEAST_POINTS: usize = 20_000;
 
@@ -74,7 +78,8 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let stand_ins = stand_ins(&points, &patches, &mesh, reach(scene, &decimation));
     let standing = Standing::new(&stand_ins, mesh.faces.len());
     let distance = IslandDistance::new(&patches);
-    let moved = offset(&mut mesh, &patches, &points, &standing, &distance, clearance);
+    let deepest = DEEPEST * (clearance + decimation.error_m);
+    let moved = offset(&mut mesh, &patches, &points, &standing, &distance, clearance, deepest);
 
     clock.stage("verify");
     let violations = verify(&mesh, &patches, &points, &standing, &distance, clearance);

@@ -81,3 +81,59 @@ fn le_bytes_16(values: &[u16]) -> Vec<u8> {
 fn le_bytes_32(values: &[u32]) -> Vec<u8> {
     values.iter().flat_map(|value| value.to_le_bytes()).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn codec(mode: &str, filter: &str, count: usize, stride: usize) -> Value {
+        json!({ "mode": mode, "filter": filter, "count": count, "byteStride": stride })
+    }
+
+    #[test]
+    fn vertices_survive_at_every_kind_of_stride() {
+        fn check<const N: usize>() {
+            let vertices: Vec<[u32; N]> = (0..300).map(|i| [i * i; N]).collect();
+            let encoded = meshopt::encode_vertex_buffer(&vertices).unwrap();
+            let decoded = decode(&codec("ATTRIBUTES", "NONE", 300, 4 * N), &encoded, "").unwrap();
+            let words: Vec<u32> = vertices.into_iter().flatten().collect();
+            assert_eq!(decoded, le_bytes_32(&words), "stride {}", 4 * N);
+        }
+        check::<1>();
+        check::<3>();
+        check::<32>();
+        check::<33>();
+        check::<64>();
+    }
+
+    #[test]
+    fn indices_survive_in_both_widths() {
+        let indices: Vec<u32> = vec![0, 1, 2, 2, 1, 3, 4, 5, 6];
+        let narrow: Vec<u16> = indices.iter().map(|&index| index as u16).collect();
+        let triangles = meshopt::encode_index_buffer(&indices, 7).unwrap();
+        let sequence = meshopt::encode_index_sequence(&indices, 7).unwrap();
+        for (mode, encoded) in [("TRIANGLES", triangles), ("INDICES", sequence)] {
+            assert_eq!(decode(&codec(mode, "NONE", 9, 4), &encoded, "").unwrap(), le_bytes_32(&indices));
+            assert_eq!(decode(&codec(mode, "NONE", 9, 2), &encoded, "").unwrap(), le_bytes_16(&narrow));
+        }
+    }
+
+    #[test]
+    fn the_exponential_filter_is_undone() {
+        let floats = [[1.5_f32, -0.25, 1024.0], [0.0, 3.0, -7.0]];
+        let encoded = meshopt::encode_filter_exp::<3>(&floats, 24, meshopt::EncodeExpMode::Separate);
+        let encoded = meshopt::encode_vertex_buffer(&encoded).unwrap();
+        let decoded = decode(&codec("ATTRIBUTES", "EXPONENTIAL", 2, 12), &encoded, "").unwrap();
+        let bits: Vec<u32> = floats.as_flattened().iter().map(|float| float.to_bits()).collect();
+        assert_eq!(decoded, le_bytes_32(&bits));
+    }
+
+    #[test]
+    fn garbage_is_refused() {
+        for mode in ["ATTRIBUTES", "TRIANGLES", "INDICES"] {
+            let refused = decode(&codec(mode, "NONE", 3, 4), &[1, 2, 3], "/p").unwrap_err();
+            assert_eq!((refused.code, refused.pointer.as_str()), (Code::Compression, "/p"));
+        }
+    }
+}

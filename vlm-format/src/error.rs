@@ -112,9 +112,16 @@ fn summary(issues: &[Issue]) -> String {
 }
 
 fn stale_summary(stale: &[Stale]) -> String {
-    let each: Vec<String> = stale.iter().map(|stale| format!("`{}`: {}", stale.vlm, stale.reason)).collect();
+    // What one tool did to a file often shows in every array; the first few tell what it was.
+    const SHOWN: usize = 3;
+    let each: Vec<String> =
+        stale.iter().take(SHOWN).map(|stale| format!("`{}`: {}", stale.vlm, stale.reason)).collect();
+    let more = match stale.len().saturating_sub(SHOWN) {
+        0 => String::new(),
+        more => format!(" (and {more} more)"),
+    };
     format!(
-        "the Virtual Light Mesh is stale: {}; bake again, as the last step after every other tool",
+        "the Virtual Light Mesh is stale: {}{more}; bake again, as the last step after every other tool",
         each.join("; ")
     )
 }

@@ -31,3 +31,8 @@ pub use save::write_atomic;
 pub use strip::EXTENSION;
 pub use validate::{MAX_ASPECT_RATIO, validate};
 pub use write::{strip_vlm, write_vlm};
+
+/// Compiles the code of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -43,7 +43,8 @@ impl Pending {
     fn write(path: &Path, bytes: &[u8], folder: &Path) -> Result<Self, Error> {
         let io = |source| Error::Io { path: path.to_owned(), action: "write", source };
         if !folder.is_dir() {
-            let source = io::Error::new(io::ErrorKind::NotFound, "the output folder does not exist");
+            let kind = if folder.exists() { io::ErrorKind::NotADirectory } else { io::ErrorKind::NotFound };
+            let source = io::Error::new(kind, "the output folder does not exist or is a file");
             return Err(Error::Io { path: folder.to_owned(), action: "write into", source });
         }
         if path.is_dir() {

@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value};
 
-use crate::check::{array, count, index};
+use crate::check::{array, count, index, layout};
 use crate::package::Parts;
 
 /// The name of the extension.
@@ -35,39 +35,58 @@ fn remove_extension(item: &mut Value) -> Option<Value> {
     Some(extension)
 }
 
-/// Removes accessors, buffer view and bytes if they are still the last of their kind.
+/// Removes accessors, buffer view and bytes, if they are still where writing put them.
+///
+/// Another tool may have renumbered what the extension names, so nothing is removed that could be anyone else's.
 fn remove_data(extension: &Value, parts: &mut Parts) -> Option<()> {
     let data = extension.get("data")?;
     let (view, before) = (index(data, "bufferView")?, count(data, "bufferByteLength")?);
-    let views = array(&parts.json, "/bufferViews");
+    let (json, others) = array(&parts.json, "/bufferViews").split_last()?;
+    let is_ours = others.len() == view && json.get("name").is_some_and(|name| name == EXTENSION);
     let accessors = array(&parts.json, "/accessors");
     let uses = |accessor: &&Value| index(accessor, "bufferView") == Some(view);
     let ours = accessors.iter().rev().take_while(uses).count();
-    if view + 1 != views.len() || accessors.iter().filter(uses).count() != ours {
+    if !is_ours || accessors.iter().filter(uses).count() != ours {
         return None;
     }
-    let (buffer, offset) = (index(&views[view], "buffer")?, count(&views[view], "byteOffset").unwrap_or(0));
+    let (buffer, offset) = (index(json, "buffer")?, count(json, "byteOffset").unwrap_or(0));
+    let is_tail = others.iter().all(|other| end_in(other, buffer) <= offset);
     let kept = accessors.len() - ours;
     truncate(&mut parts.json, "accessors", kept);
     truncate(&mut parts.json, "bufferViews", view);
-    shrink_buffer(buffer, usize::try_from(offset).ok()?, before, parts)
+    if is_tail { shrink_buffer(buffer, usize::try_from(offset).ok()?, before, parts) } else { None }
 }
 
-/// Gives a buffer its former length, or removes it if it was made for the extension.
+/// Where the last byte that a buffer view needs of a buffer ends.
+fn end_in(view: &Value, buffer: usize) -> u64 {
+    let codec = layout::meshopt(view).map(|(_, codec)| codec);
+    let ranges = std::iter::once(view).chain(codec).filter(|range| index(range, "buffer") == Some(buffer));
+    let ends = ranges.map(|range| {
+        count(range, "byteOffset").unwrap_or(0).saturating_add(count(range, "byteLength").unwrap_or(0))
+    });
+    ends.max().unwrap_or(0)
+}
+
+/// Gives the BIN chunk its former length, or removes a buffer that was made for the extension.
 fn shrink_buffer(buffer: usize, offset: usize, before: u64, parts: &mut Parts) -> Option<()> {
     let buffers = array(&parts.json, "/buffers").len();
     let json = parts.json.pointer_mut(&format!("/buffers/{buffer}"))?;
     let uri = json.get("uri").and_then(Value::as_str).map(str::to_owned);
-    if before > 0 {
-        json["byteLength"] = before.into();
-    } else if buffer + 1 == buffers {
-        truncate(&mut parts.json, "buffers", buffer);
-    }
-    if let Some(uri) = uri {
-        parts.drop_file(&uri);
-    } else if let Some(bin) = &mut parts.bin {
-        bin.truncate(offset);
-        parts.bin.take_if(|bin| bin.is_empty());
+    match uri {
+        Some(uri) if before == 0 && buffer + 1 == buffers => {
+            parts.drop_file(&uri);
+            truncate(&mut parts.json, "buffers", buffer);
+        }
+        None if buffer == 0 => {
+            if before == 0 {
+                truncate(&mut parts.json, "buffers", 0);
+            } else {
+                json["byteLength"] = before.into();
+            }
+            parts.bin.as_mut()?.truncate(offset);
+            parts.bin.take_if(|bin| bin.is_empty());
+        }
+        _ => {}
     }
     Some(())
 }

@@ -225,8 +225,26 @@ impl Extension {
             String::from("data"),
             json!({ "bufferView": view, "bufferByteLength": place.length_before }),
         );
-        insert_extension(&mut parts.json, Value::Object(self.json));
+        let mut json = Value::Object(self.json);
+        shorten_floats(&mut json);
+        insert_extension(&mut parts.json, json);
         push(&mut parts.json, "extensionsUsed", json!(EXTENSION));
+    }
+}
+
+/// Writes numbers of single precision with as few digits as they need: 0.1, not 0.10000000149011612.
+fn shorten_floats(json: &mut Value) {
+    match json {
+        Value::Array(list) => list.iter_mut().for_each(shorten_floats),
+        Value::Object(map) => map.values_mut().for_each(shorten_floats),
+        Value::Number(number) if number.is_f64() => {
+            let single = number.as_f64().map(|number| number as f32);
+            let shortest = single.and_then(|single| single.to_string().parse::<f64>().ok());
+            if let Some(shortest) = shortest.and_then(serde_json::Number::from_f64) {
+                *number = shortest;
+            }
+        }
+        _ => {}
     }
 }
 

@@ -1,0 +1,63 @@
+//! Writing to disk: all or nothing, and a clear word when it cannot be.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use vlm_format::{Error, OutputFile, write_atomic};
+
+fn output(path: &str, text: &str) -> OutputFile {
+    OutputFile { path: PathBuf::from(path), bytes: text.as_bytes().to_vec(), copied_from: None }
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn files_and_folders_arrive_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    write_atomic(&[output("a.gltf", "json"), output("textures/a.png", "image")], folder.path()).unwrap();
+    assert_eq!(names(folder.path()), ["a.gltf", "textures"]);
+    assert_eq!(fs::read(folder.path().join("textures/a.png")).unwrap(), b"image");
+    write_atomic(&[output("a.gltf", "other")], folder.path()).unwrap();
+    assert_eq!(fs::read(folder.path().join("a.gltf")).unwrap(), b"other");
+}
+
+#[test]
+fn a_file_that_is_already_right_is_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.png");
+    fs::write(&path, "image").unwrap();
+    let before = fs::metadata(&path).unwrap().modified().unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(20));
+    write_atomic(&[output("a.png", "image")], folder.path()).unwrap();
+    assert_eq!(fs::metadata(&path).unwrap().modified().unwrap(), before);
+}
+
+#[test]
+fn a_failure_leaves_everything_as_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("a.gltf"), "old").unwrap();
+    fs::create_dir(folder.path().join("folder.bin")).unwrap();
+    let too_long = "x".repeat(300);
+    for bad in ["folder.bin", &too_long] {
+        let error = write_atomic(&[output(bad, "data"), output("a.gltf", "new")], folder.path()).unwrap_err();
+        assert!(matches!(&error, Error::Io { .. }) && error.to_string().contains(bad), "{error}");
+        assert_eq!(names(folder.path()), ["a.gltf", "folder.bin"]);
+        assert_eq!(fs::read(folder.path().join("a.gltf")).unwrap(), b"old");
+    }
+}
+
+#[test]
+fn a_missing_output_folder_is_named() {
+    let folder = tempfile::tempdir().unwrap().path().join("missing");
+    let error = write_atomic(&[output("a.glb", "")], &folder).unwrap_err().to_string();
+    for part in [&*folder.display().to_string(), "does not exist", "check the path"] {
+        assert!(error.contains(part), "`{part}` is missing in: {error}");
+    }
+}

@@ -1,0 +1,96 @@
+//! What is written conforms to the JSON Schemas of the extension.
+
+use std::fs;
+use std::path::Path;
+
+use jsonschema::Validator;
+use serde_json::{Value, json};
+use vlm_format::{Container, EXTENSION, GltfFile, Target, VlmAsset, write_vlm};
+use vlm_tests::sample_asset::{quads, room};
+
+fn schema(object: &str) -> Validator {
+    let name = format!("../vlm-format/schema/{object}.{EXTENSION}.schema.json");
+    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
+    let schema: Value = serde_json::from_str(&text).unwrap();
+    jsonschema::draft202012::meta::validate(&schema).unwrap();
+    jsonschema::draft202012::new(&schema).unwrap()
+}
+
+fn written(file: &GltfFile, asset: &VlmAsset) -> Value {
+    let target =
+        Target { container: Container::Gltf { embedded: true }, file_name: String::from("room.gltf") };
+    serde_json::from_slice(&write_vlm(file, asset, &target).unwrap()[0].bytes).unwrap()
+}
+
+#[test]
+fn written_extensions_conform() {
+    let file = room();
+    let nothing = VlmAsset { sample_starts: vec![0], ..VlmAsset::default() };
+    for asset in [quads(&file), nothing] {
+        let json = written(&file, &asset);
+        let root = &json["extensions"][EXTENSION];
+        schema("glTF").validate(root).unwrap_or_else(|error| panic!("{error}: {root:#}"));
+        for vlm in &asset.vlms {
+            schema("node").validate(&json["nodes"][vlm.node as usize]["extensions"][EXTENSION]).unwrap();
+        }
+        for &(mesh, primitive, _) in &asset.primitive_tags {
+            let primitive = &json["meshes"][mesh as usize]["primitives"][primitive as usize];
+            schema("mesh.primitive").validate(&primitive["extensions"][EXTENSION]).unwrap();
+        }
+    }
+}
+
+#[test]
+fn every_property_is_described() {
+    let file = room();
+    let json = written(&file, &quads(&file));
+    let mut root = json["extensions"][EXTENSION].clone();
+    let text = fs::read_to_string(
+        Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../vlm-format/schema/glTF.VLM_virtual_light_mesh.schema.json"),
+    )
+    .unwrap();
+    let mut strict: Value = serde_json::from_str(&text).unwrap();
+    forbid_others(&mut strict);
+    let strict = jsonschema::draft202012::new(&strict).unwrap();
+    strict.validate(&root).unwrap_or_else(|error| panic!("{error}"));
+    root["lights"]["undescribed"] = json!(1);
+    assert!(!strict.is_valid(&root));
+}
+
+/// Makes every object of a schema refuse properties that it does not describe.
+fn forbid_others(schema: &mut Value) {
+    match schema {
+        Value::Object(map) => {
+            map.values_mut().for_each(forbid_others);
+            if map.get("properties").is_some_and(Value::is_object) {
+                map.insert(String::from("additionalProperties"), json!(false));
+            }
+        }
+        Value::Array(list) => list.iter_mut().for_each(forbid_others),
+        _ => {}
+    }
+}
+
+#[test]
+fn broken_extensions_do_not_conform() {
+    let file = room();
+    let json = written(&file, &quads(&file));
+    let root = &json["extensions"][EXTENSION];
+    let schema = schema("glTF");
+    for (pointer, value) in [
+        ("/vlms/0/id", json!("")),
+        ("/vlms/0/lights", json!([0])),
+        ("/vlms/0/digests/geometry", json!("xyz")),
+        ("/lights/positions/accessor", json!(-1)),
+        ("/lights/albedo", json!(3)),
+        ("/samples/starts", json!(null)),
+        ("/grid/cellSize", json!(0)),
+        ("/grid/dimensions", json!([1, 2])),
+        ("/data/bufferView", json!("0")),
+    ] {
+        let mut broken = root.clone();
+        *broken.pointer_mut(pointer).unwrap() = value;
+        assert!(!schema.is_valid(&broken), "a wrong {pointer} conforms");
+    }
+}
