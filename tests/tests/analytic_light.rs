@@ -1,5 +1,7 @@
 //! Scenes with a known answer, for every method that must give it.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use glam::Vec3;
 use vlm_bake::progress::Silent;
 use vlm_bake::render::{Method, RenderOptions, render};

@@ -1,5 +1,7 @@
 //! The Cornell box, baked and rendered by every method, against the path-traced truth.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::path::Path;
 
 use glam::Vec3;

@@ -1,5 +1,7 @@
 //! Which surfaces rays see, pass and stop at.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use glam::Vec3;
 use vlm_bake::gbuffer::GBuffer;
 use vlm_bake::progress::Silent;

@@ -5,8 +5,8 @@
 //! few, well-shaped lights.
 
 use glam::DVec3;
-use rustc_hash::FxHashMap;
 use meshopt::SimplifyOptions;
+use rustc_hash::FxHashMap;
 
 use crate::options::BakeOptions;
 use crate::patches::Patches;

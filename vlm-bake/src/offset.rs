@@ -51,12 +51,18 @@ pub fn offset(
     let normals: Vec<DVec3> = (0..mesh.faces.len()).map(|f| mesh.normal(f)).collect();
     let incident = incident_faces(mesh, patches);
     let needed = |mesh: &LightMesh, f: usize| {
-        needed_depth(&mesh.corners(f), normals[f], standing.of(f).iter().map(|&p| &points[p as usize]), target)
+        needed_depth(
+            &mesh.corners(f),
+            normals[f],
+            standing.of(f).iter().map(|&p| &points[p as usize]),
+            target,
+        )
     };
     // A face that would have to sink deeper than decimation can explain stands for something it does not resemble: it
     // stays near the surface, fails the check, and is tagged.
     let bounded = |depth: f64| if depth > deepest { target } else { depth.max(target) };
-    let mut depth: Vec<f64> = (0..mesh.faces.len()).into_par_iter().map(|f| bounded(needed(mesh, f))).collect();
+    let mut depth: Vec<f64> =
+        (0..mesh.faces.len()).into_par_iter().map(|f| bounded(needed(mesh, f))).collect();
     for _ in 0..ROUNDS {
         displace(mesh, &rest, &normals, &depth, &incident);
         pull_inside(mesh, patches, &incident, distance, target);
@@ -111,7 +117,8 @@ fn incident_faces(mesh: &LightMesh, patches: &Patches) -> Vec<Vec<u32>> {
 /// Moves every vertex from its place of rest to satisfy the depths of its faces.
 fn displace(mesh: &mut LightMesh, rest: &[DVec3], normals: &[DVec3], depth: &[f64], incident: &[Vec<u32>]) {
     mesh.positions.par_iter_mut().zip(rest).zip(incident).for_each(|((position, at), faces)| {
-        *position = *at + shortest_displacement(faces.iter().map(|&f| (normals[f as usize], depth[f as usize])));
+        *position =
+            *at + shortest_displacement(faces.iter().map(|&f| (normals[f as usize], depth[f as usize])));
     });
 }
 
@@ -176,7 +183,9 @@ mod tests {
 
     #[test]
     fn opposite_walls_stop_at_the_limit() {
-        let moved = shortest_displacement([(DVec3::Z, 0.1), (dvec3(0.1, 0.0, -1.0).normalize_or_zero(), 0.1)].into_iter());
+        let moved = shortest_displacement(
+            [(DVec3::Z, 0.1), (dvec3(0.1, 0.0, -1.0).normalize_or_zero(), 0.1)].into_iter(),
+        );
         assert!(moved.length() <= 0.4 + 1e-9);
     }
 }

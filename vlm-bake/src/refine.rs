@@ -73,7 +73,8 @@ impl Eq for Candidate {}
 /// 0 makes no lights.
 #[must_use]
 pub fn refine(mesh: &LightMesh, density: &[f64], budget: usize) -> Lights {
-    let mut cutter = Cutter { positions: mesh.positions.clone(), lights: Vec::new(), midpoints: FxHashMap::default() };
+    let mut cutter =
+        Cutter { positions: mesh.positions.clone(), lights: Vec::new(), midpoints: FxHashMap::default() };
     for (f, face) in mesh.faces.iter().enumerate() {
         if density[f] > 0.0 {
             cutter.lights.push(Light { vertices: face.vertices, face: f as u32 });
@@ -138,8 +139,8 @@ impl Cutter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::topology::aspect_ratio;
     use crate::decimate::Face;
+    use crate::topology::aspect_ratio;
     use glam::dvec3;
 
     fn one_face(corners: [DVec3; 3]) -> LightMesh {

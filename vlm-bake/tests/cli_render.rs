@@ -1,5 +1,7 @@
 //! `vlm render` as a user or a script meets it.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::path::Path;
 use std::process::{Command, Output};
 
