@@ -85,12 +85,19 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
 
     clock.stage("refine");
     let density = densities(scene, &patches, &mesh, &of_faces);
-    let mut lights = refine(&mesh, &density, (options.lights as usize).saturating_sub(authored::count(scene)));
+    let mut lights =
+        refine(&mesh, &density, (options.lights as usize).saturating_sub(authored::count(scene)));
     let of_lights = Standing::new(&hand_on(&points, &of_faces, &lights), lights.len());
 
     clock.stage("verify");
-    let evidence =
-        Evidence { patches: &patches, mesh: &mesh, points: &points, standing: &of_lights, distance: &distance, clearance };
+    let evidence = Evidence {
+        patches: &patches,
+        mesh: &mesh,
+        points: &points,
+        standing: &of_lights,
+        distance: &distance,
+        clearance,
+    };
     sink(&mut lights, &evidence, deepest);
     let violations = verify(&lights, &evidence);
 
@@ -159,7 +166,8 @@ fn remaining(
     let mut report = ClearanceReport::default();
     for violation in violations {
         let face = lights[violation.light as usize].face;
-        let primitive = evidence.patches.regions[evidence.mesh.faces[face as usize].region as usize].primitive;
+        let primitive =
+            evidence.patches.regions[evidence.mesh.faces[face as usize].region as usize].primitive;
         let tag = tags.lights[violation.light as usize];
         if tag == 0 || tag != tags.of_primitive(scene, primitive) {
             report.violations += u64::from(violation.points) + u64::from(violation.pokes_out);

@@ -5,8 +5,8 @@
 //! few, well-shaped lights.
 
 use glam::DVec3;
-use rustc_hash::FxHashMap;
 use meshopt::SimplifyOptions;
+use rustc_hash::FxHashMap;
 
 use crate::options::BakeOptions;
 use crate::patches::Patches;
@@ -106,7 +106,8 @@ impl SimplifierInput {
         for (corners, &region) in patches.triangles.iter().zip(&patches.triangle_region) {
             for &welded in corners {
                 let vertex = *vertex_of.entry((welded, region)).or_insert_with(|| {
-                    let place = patches.positions[welded as usize] - origin + apart(patches.vertex_object[welded as usize], extent);
+                    let place = patches.positions[welded as usize] - origin
+                        + apart(patches.vertex_object[welded as usize], extent);
                     input.positions.push(place.as_vec3().to_array());
                     input.vertex_welded.push(welded);
                     input.vertex_region.push(region);
@@ -166,7 +167,8 @@ impl SimplifierInput {
 
 /// A shift for an object, different for each and unlikely to make places of two objects meet, at most as long as the scene.
 fn apart(object: u32, extent: f64) -> DVec3 {
-    DVec3::new(0.754_877_666, 0.569_840_290, 0.430_159_709).map(|step| (f64::from(object) * step).fract() * extent)
+    DVec3::new(0.754_877_666, 0.569_840_290, 0.430_159_709)
+        .map(|step| (f64::from(object) * step).fract() * extent)
 }
 
 /// Gives two-sided surfaces a second sheet of faces with vertices of its own, turned round.

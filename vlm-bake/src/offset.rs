@@ -55,7 +55,8 @@ pub fn offset(
         // A point deeper than that lies in a recess that decimation bridged: behind the light, and so unlit by it.
         own.map(|x| (face - x).dot(normals[f]) + target).filter(|&lack| lack <= deepest).fold(0.0, f64::max)
     };
-    let mut depth: Vec<f64> = (0..mesh.faces.len()).into_par_iter().map(|f| lack(mesh, f).max(target)).collect();
+    let mut depth: Vec<f64> =
+        (0..mesh.faces.len()).into_par_iter().map(|f| lack(mesh, f).max(target)).collect();
     for _ in 0..ROUNDS {
         displace(mesh, &rest, &normals, &depth, &incident);
         pull_inside(mesh, patches, &incident, distance, target);
@@ -87,7 +88,8 @@ fn incident_faces(mesh: &LightMesh, patches: &Patches) -> Vec<Vec<u32>> {
 /// Moves every vertex from its place of rest to satisfy the depths of its faces.
 fn displace(mesh: &mut LightMesh, rest: &[DVec3], normals: &[DVec3], depth: &[f64], incident: &[Vec<u32>]) {
     mesh.positions.par_iter_mut().zip(rest).zip(incident).for_each(|((position, at), faces)| {
-        *position = *at + shortest_displacement(faces.iter().map(|&f| (normals[f as usize], depth[f as usize])));
+        *position =
+            *at + shortest_displacement(faces.iter().map(|&f| (normals[f as usize], depth[f as usize])));
     });
 }
 
@@ -152,7 +154,9 @@ mod tests {
 
     #[test]
     fn opposite_walls_stop_at_the_limit() {
-        let moved = shortest_displacement([(DVec3::Z, 0.1), (dvec3(0.1, 0.0, -1.0).normalize_or_zero(), 0.1)].into_iter());
+        let moved = shortest_displacement(
+            [(DVec3::Z, 0.1), (dvec3(0.1, 0.0, -1.0).normalize_or_zero(), 0.1)].into_iter(),
+        );
         assert!(moved.length() <= 0.4 + 1e-9);
     }
 }

@@ -8,8 +8,8 @@
 use std::collections::hash_map::Entry;
 
 use glam::{DVec3, Vec3};
-use rustc_hash::FxHashMap;
 use petgraph::unionfind::UnionFind;
+use rustc_hash::FxHashMap;
 
 use crate::scene::{Scene, Surface};
 use crate::topology::{cross_of, edge_uses, edges};

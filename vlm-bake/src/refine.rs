@@ -95,8 +95,8 @@ pub fn refine(mesh: &LightMesh, density: &[f64], budget: usize) -> Vec<Light> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::topology::aspect_ratio;
     use crate::decimate::Face;
+    use crate::topology::aspect_ratio;
     use glam::dvec3;
 
     fn one_face(corners: [DVec3; 3]) -> LightMesh {

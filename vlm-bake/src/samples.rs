@@ -96,12 +96,19 @@ pub fn samples(sources: &Sources, lights: &[Light], count: u32) -> Vec<BakedLigh
 }
 
 /// One light with colours and samples; `None` if it stands for nothing that shines.
-fn finish_light(sources: &Sources, number: usize, light: &Light, ratio: f32, count: usize) -> Option<BakedLight> {
+fn finish_light(
+    sources: &Sources,
+    number: usize,
+    light: &Light,
+    ratio: f32,
+    count: usize,
+) -> Option<BakedLight> {
     let candidates = candidates(sources, number, light);
     let region = sources.patches.regions[sources.mesh.faces[light.face as usize].region as usize];
     let object = sources.scene.primitives[region.primitive as usize].object;
     let steering = &sources.scene.objects[object as usize].steering;
-    let bare = BakedLight { corners: light.corners, object, tag: sources.tags[number], ..BakedLight::default() };
+    let bare =
+        BakedLight { corners: light.corners, object, tag: sources.tags[number], ..BakedLight::default() };
     let finished = colour(bare, &candidates, ratio, steering, count);
     (!finished.samples.is_empty() || finished.emission != Vec3::ZERO).then_some(finished)
 }

@@ -92,7 +92,12 @@ pub fn spread_over([a, b, c]: [DVec3; 3], count: u32) -> impl Iterator<Item = DV
 /// same way. `None` where decimation left none within `reach` metres: the point's light is lost, and the report says how
 /// much.
 #[must_use]
-pub fn stand_ins(points: &[SurfacePoint], patches: &Patches, mesh: &LightMesh, reach: f64) -> Vec<Option<u32>> {
+pub fn stand_ins(
+    points: &[SurfacePoint],
+    patches: &Patches,
+    mesh: &LightMesh,
+    reach: f64,
+) -> Vec<Option<u32>> {
     let triangles: Vec<[u32; 3]> = mesh.faces.iter().map(|f| f.vertices).collect();
     let normals: Vec<DVec3> = (0..mesh.faces.len()).into_par_iter().map(|f| mesh.normal(f)).collect();
     let region = |f: usize| mesh.faces[f].region;
@@ -105,11 +110,16 @@ pub fn stand_ins(points: &[SurfacePoint], patches: &Patches, mesh: &LightMesh, r
             let own = patches.triangle_region[point.triangle as usize];
             let place = &patches.regions[own as usize];
             let alike = |f: u32| {
-                mesh.faces[f as usize].back == point.back && normals[f as usize].dot(point.normal) > LEAST_COSINE
+                mesh.faces[f as usize].back == point.back
+                    && normals[f as usize].dot(point.normal) > LEAST_COSINE
             };
-            let kin = |f: u32| patches.regions[region(f as usize) as usize].primitive == place.primitive && alike(f);
+            let kin = |f: u32| {
+                patches.regions[region(f as usize) as usize].primitive == place.primitive && alike(f)
+            };
             let found = regions.closest(own, point.position, reach, alike);
-            found.or_else(|| islands.closest(place.island, point.position, reach, kin)).map(|near| near.triangle)
+            found
+                .or_else(|| islands.closest(place.island, point.position, reach, kin))
+                .map(|near| near.triangle)
         })
         .collect()
 }
@@ -122,7 +132,8 @@ pub fn hand_on(points: &[SurfacePoint], standing: &Standing, lights: &[Light]) -
     let numbers: Vec<u32> = (0..lights.len() as u32).collect();
     let runs: Vec<&[u32]> =
         numbers.chunk_by(|&a, &b| lights[a as usize].face == lights[b as usize].face).collect();
-    let nearest: Vec<Vec<(u32, u32)>> = runs.par_iter().map(|run| nearest_of(points, standing, lights, run)).collect();
+    let nearest: Vec<Vec<(u32, u32)>> =
+        runs.par_iter().map(|run| nearest_of(points, standing, lights, run)).collect();
     for (point, light) in nearest.into_iter().flatten() {
         light_of[point as usize] = Some(light);
     }
@@ -130,7 +141,12 @@ pub fn hand_on(points: &[SurfacePoint], standing: &Standing, lights: &[Light]) -
 }
 
 /// For each point of a face, the nearest of the face's lights.
-fn nearest_of(points: &[SurfacePoint], standing: &Standing, lights: &[Light], run: &[u32]) -> Vec<(u32, u32)> {
+fn nearest_of(
+    points: &[SurfacePoint],
+    standing: &Standing,
+    lights: &[Light],
+    run: &[u32],
+) -> Vec<(u32, u32)> {
     let Some(&first) = run.first() else { return Vec::new() };
     let own = standing.of(lights[first as usize].face as usize);
     if run.len() == 1 {

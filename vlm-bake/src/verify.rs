@@ -139,7 +139,8 @@ fn poke(light: &Light, island: u32, evidence: &Evidence, violation: &mut Violati
     let [a, b, c] = light.corners;
     let (normal, room) = (light.normal(), POKE_SHARE * evidence.clearance);
     for place in [a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0] {
-        let other_side = evidence.distance.at(place, island).filter(|n| n.normal.dot(normal) < OTHER_SIDE_COSINE);
+        let other_side =
+            evidence.distance.at(place, island).filter(|n| n.normal.dot(normal) < OTHER_SIDE_COSINE);
         let out = other_side.map_or(f64::NEG_INFINITY, |n| n.signed + room);
         if out > 0.0 {
             violation.pokes_out = true;

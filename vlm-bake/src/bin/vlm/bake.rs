@@ -86,8 +86,8 @@ pub fn run(args: &BakeArgs) -> Result<(), CliError> {
     bars.begin("read", 1);
     let file = open(&args.input)?;
     let scene = load_scene(&file, &bars)?;
-    let mut baked = bake(&scene, &options(args, &scene), &bars)
-        .map_err(|error| CliError::check(file.name(), error))?;
+    let mut baked =
+        bake(&scene, &options(args, &scene), &bars).map_err(|error| CliError::check(file.name(), error))?;
 
     bars.begin("write", 1);
     let outputs = write_vlm(&file, &baked.asset, &target)?;
@@ -167,7 +167,9 @@ fn deliver(output: &Path, outputs: &[OutputFile]) -> Result<(), CliError> {
 }
 
 fn write_report(path: &Path, report: &Report) -> Result<(), CliError> {
-    let broken = |e: &dyn std::fmt::Display| CliError::usage(format!("{}: the report was not written: {e}", path.display()));
+    let broken = |e: &dyn std::fmt::Display| {
+        CliError::usage(format!("{}: the report was not written: {e}", path.display()))
+    };
     let json = serde_json::to_string_pretty(report).map_err(|e| broken(&e))?;
     fs::write(path, json + "\n").map_err(|e| broken(&e))
 }
