@@ -38,7 +38,7 @@ pub fn cornell() -> Vec<u8> {
         "translation": [0.0, 4.2, -2.796],
         "extensions": { "KHR_lights_punctual": { "light": 0 } },
     });
-    room_with(("short block", block(SHORT_BLOCK, 1.65)), lamp, lamp_node)
+    room_with("short block", &block(SHORT_BLOCK, 1.65), &lamp, &lamp_node)
 }
 
 /// A sphere in place of the short block, lit by a spot light from the upper back right corner.
@@ -60,10 +60,10 @@ pub fn cornell_sphere() -> Vec<u8> {
         "rotation": rotation_to(std::array::from_fn(|k| target[k] - position[k])),
         "extensions": { "KHR_lights_punctual": { "light": 0 } },
     });
-    room_with(("sphere", sphere([0.9, 0.9, -1.7], 0.9, 4)), spot, spot_node)
+    room_with("sphere", &sphere([0.9, 0.9, -1.7], 0.9, 4), &spot, &spot_node)
 }
 
-fn room_with((name, object): (&str, Mesh), light: Value, light_node: Value) -> Vec<u8> {
+fn room_with(name: &str, object: &Mesh, light: &Value, light_node: &Value) -> Vec<u8> {
     let mut glb = Glb::new(document());
     let room = json!([
         glb.primitive(&floor_ceiling_back(), WHITE),
@@ -71,7 +71,7 @@ fn room_with((name, object): (&str, Mesh), light: Value, light_node: Value) -> V
         glb.primitive(&side_wall(HALF_WIDTH), GREEN),
     ]);
     let tall = json!([glb.primitive(&block(TALL_BLOCK, 3.3), WHITE)]);
-    let object = json!([glb.primitive(&object, WHITE)]);
+    let object = json!([glb.primitive(object, WHITE)]);
     glb.json["meshes"] = json!([
         { "name": "room", "primitives": room },
         { "name": "tall block", "primitives": tall },

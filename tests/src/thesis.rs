@@ -12,6 +12,7 @@ use std::time::Instant;
 use glam::{UVec3, Vec3};
 use rayon::prelude::*;
 use vlm_bake::gbuffer::GBuffer;
+use vlm_bake::progress::Progress;
 use vlm_bake::render::{LitScene, RenderError, RenderStats, Rendering};
 use vlm_bake::scene::{Camera, Scene};
 use vlm_bake::shade::TraceScene;
@@ -196,6 +197,7 @@ pub fn render(
     camera: &Camera,
     (width, height): (u32, u32),
     options: &ThesisOptions,
+    progress: &dyn Progress,
 ) -> Result<(Rendering, ThesisGrid), RenderError> {
     let trace = TraceScene::new(scene);
     let gbuffer = GBuffer::trace(&trace, camera, width, height);
@@ -204,7 +206,7 @@ pub fn render(
     let (low, high) = bounds(&scene.positions);
     let grid = ThesisGrid::build(&lit.lights.geometry, low, high, options);
     let (indirect, stats): (_, RenderStats) =
-        lit.gather(&gbuffer, |receiver| gather(&lit, grid.lights_at(receiver.position), receiver));
+        lit.gather(&gbuffer, progress, |receiver| gather(&lit, grid.lights_at(receiver.position), receiver));
     Ok((Rendering { gbuffer, direct, indirect, stats }, grid))
 }
 

@@ -1,6 +1,7 @@
 //! Scenes with a known answer, for every method that must give it.
 
 use glam::Vec3;
+use vlm_bake::progress::Silent;
 use vlm_bake::render::{Method, RenderOptions, render};
 use vlm_bake::scene::{Camera, Scene};
 use vlm_format::VlmAsset;
@@ -21,14 +22,14 @@ fn mean(indirect: &[Vec3]) -> f64 {
 
 fn indirect(scene: &Scene, asset: &VlmAsset, camera: &Camera, method: Method) -> Vec<Vec3> {
     let options = RenderOptions { width: SIZE, height: SIZE, method, samples: SAMPLES };
-    render(scene, Some(asset), camera, &options, &|_| ()).unwrap().indirect
+    render(scene, Some(asset), camera, &options, &Silent).unwrap().indirect
 }
 
 /// The picture by the reference, by every light, and by the thesis' method with a range that leaves nothing out.
 fn every_method(scene: &Scene, camera: &Camera) -> Vec<(&'static str, Vec<Vec3>)> {
     let asset = exact_lights(scene);
     let unlimited = ThesisOptions { range: 1e4, list: asset.triangles.len() as u32, grid: 1 };
-    let (by_thesis, grid) = thesis::render(scene, &asset, camera, (SIZE, SIZE), &unlimited).unwrap();
+    let (by_thesis, grid) = thesis::render(scene, &asset, camera, (SIZE, SIZE), &unlimited, &Silent).unwrap();
     assert_eq!(grid.overflow.dropped, 0);
     vec![
         ("reference", indirect(scene, &asset, camera, Method::Reference)),

@@ -1,5 +1,7 @@
 //! Every scene and object of the test assets loads: triangles as counted, textures decoded, numbers finite.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
 use std::path::Path;
 use std::time::Instant;
 use vlm_bake::scene::{self, LoadOptions, Scene};
@@ -85,6 +87,40 @@ fn every_object_loads() {
     for path in paths {
         load(&path);
     }
+}
+
+/// The corpus is full of oddities: whatever the reader accepts becomes a scene that keeps its promises, or an error
+/// that says why not.
+#[test]
+fn the_corpus_loads_or_says_why_not() {
+    let Some(folder) = vlm_tests::assets::find("corpus") else { return };
+    let mut pending = vec![folder];
+    let mut files = Vec::new();
+    while let Some(path) = pending.pop() {
+        if path.is_dir() {
+            pending.extend(std::fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()));
+        } else if path.extension().is_some_and(|kind| kind == "glb" || kind == "gltf") {
+            files.push(path);
+        }
+    }
+    files.sort();
+    let (mut loaded, mut refused) = (0, 0);
+    for path in &files {
+        let Ok(file) = GltfFile::open(path) else { continue };
+        match scene::load(&file, &LoadOptions::default()) {
+            Ok(scene) => {
+                check(&scene);
+                assert_eq!(scene.triangle_surfaces().len(), scene.triangles.len());
+                loaded += 1;
+            }
+            Err(error) => {
+                eprintln!("{error}");
+                refused += 1;
+            }
+        }
+    }
+    eprintln!("{} files: {loaded} loaded, {refused} without a scene", files.len());
+    assert!(loaded > 100, "only {loaded} of {} load", files.len());
 }
 
 #[test]

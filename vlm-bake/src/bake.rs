@@ -19,13 +19,19 @@ use crate::report::{AreaReport, DecimationReport, GridReport, OffsetReport, Repo
 use crate::samples::{BakedLight, Sources, samples};
 use crate::scene::Scene;
 use crate::signed_distance::IslandDistance;
+use crate::slivers::MAX_ASPECT;
 use crate::surface::{Standing, SurfacePoint, spread_points, stand_ins};
 use crate::tag::{Tags, tag};
+use crate::topology::aspect_ratio;
 use crate::verify::{ClearanceReport, Violation, verify};
 use crate::write::{assemble, order, placeable};
 
 /// A face stands for surface at most this share of the scene's extent away, on top of four times the decimation's error.
 const REACH_SHARE: f64 = 0.02;
+
+/// Lights sink by at most this many times the clearance and the decimation's error together. The error is a root mean
+/// square: single places are off by a few times as much.
+const DEEPEST: f64 = 4.0;
 
 /// The least number of surface points of a bake: small budgets are tested as finely as medium ones.
 const LEAST_POINTS: usize = 20_000;
@@ -74,7 +80,8 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let stand_ins = stand_ins(&points, &patches, &mesh, reach(scene, &decimation));
     let standing = Standing::new(&stand_ins, mesh.faces.len());
     let distance = IslandDistance::new(&patches);
-    let moved = offset(&mut mesh, &patches, &points, &standing, &distance, clearance);
+    let deepest = DEEPEST * (clearance + decimation.error_m);
+    let moved = offset(&mut mesh, &patches, &points, &standing, &distance, clearance, deepest);
 
     clock.stage("verify");
     let violations = verify(&mesh, &patches, &points, &standing, &distance, clearance);
@@ -102,7 +109,9 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let authored_check = authored::merge(scene, &mut lights, &mut tags, options, clearance);
 
     clock.stage("grid");
+    let authored_before = authored_lights(&lights);
     lights.retain(|light| placeable(scene, light));
+    let authored_dropped = authored_before - authored_lights(&lights);
     order(&mut lights);
     let corners: Vec<[DVec3; 3]> = lights.iter().map(|l| l.corners).collect();
     let grid = grid(scene, &corners, options.cell_size, options.range);
@@ -121,12 +130,12 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
         tags: tags.report(),
         area: area_report(&points, &stand_ins, &lights),
         grid: grid_report(grid.as_ref()),
-        notes: scene.notes.clone(),
+        notes: notes(scene, authored_dropped),
         ..Report::default()
     };
     let asset = assemble(scene, &lights, &tags, grid, options);
     report.lights = asset.triangles.len();
-    report.authored_lights = lights.iter().filter(|l| l.authored).count();
+    report.authored_lights = authored_lights(&lights);
     report.samples = asset.samples.len();
     report.missed_because = why_missed(&report, options);
     report.seconds = clock.finish();
@@ -153,6 +162,20 @@ fn remaining(
     report
 }
 
+fn authored_lights(lights: &[BakedLight]) -> usize {
+    lights.iter().filter(|light| light.authored).count()
+}
+
+fn notes(scene: &Scene, authored_dropped: usize) -> Vec<String> {
+    let mut notes = scene.notes.clone();
+    if authored_dropped > 0 {
+        notes.push(format!(
+            "{authored_dropped} authored lights left out: longer than {MAX_ASPECT} times their height; divide these triangles"
+        ));
+    }
+    notes
+}
+
 fn point_count(options: &BakeOptions) -> usize {
     (options.lights as usize * options.tests_per_light as usize).max(LEAST_POINTS)
 }
@@ -163,12 +186,13 @@ fn reach(scene: &Scene, decimation: &Decimation) -> f64 {
     REACH_SHARE * extent + 4.0 * decimation.error_m
 }
 
-/// The artist's density per face; 0 where a face stands for nothing.
+/// The artist's density per face; 0 where a face stands for nothing, or where the offset made it too thin to be a light.
 fn densities(scene: &Scene, patches: &Patches, mesh: &LightMesh, standing: &Standing) -> Vec<f64> {
     let density = |(f, face): (usize, &crate::decimate::Face)| {
         let primitive = &scene.primitives[patches.regions[face.region as usize].primitive as usize];
         let asked = f64::from(scene.objects[primitive.object as usize].steering.density);
-        if standing.of(f).is_empty() { 0.0 } else { asked }
+        let too_thin = aspect_ratio(mesh.corners(f)) > MAX_ASPECT;
+        if standing.of(f).is_empty() || too_thin { 0.0 } else { asked }
     };
     mesh.faces.iter().enumerate().map(density).collect()
 }

@@ -4,14 +4,14 @@
 //! implemented by meshoptimizer. Coplanar triangles are then merged and triangulated again (`planar`), so that a flat wall costs
 //! few, well-shaped lights.
 
-use std::collections::HashMap;
-
 use glam::DVec3;
+use rustc_hash::FxHashMap;
 use meshopt::SimplifyOptions;
 
 use crate::options::BakeOptions;
 use crate::patches::Patches;
 use crate::planar::merge_coplanar;
+use crate::slivers::remove_slivers;
 use crate::topology::cross_of;
 
 /// A triangle mesh between decimation and the final lights, in world space.
@@ -75,6 +75,7 @@ pub fn decimate(patches: &Patches, options: &BakeOptions) -> (LightMesh, Decimat
     let fronts = asked * patches.triangles.len() / doubled.max(1);
     let (indices, error_m) = input.simplify(fronts, options.free_error as f32);
     let mut mesh = merge_coplanar(input.mesh(patches, &indices));
+    remove_slivers(&mut mesh);
     add_backs(&mut mesh, patches);
     let reached = mesh.faces.len();
     (mesh, Decimation { asked, reached, error_m })
@@ -98,7 +99,7 @@ impl SimplifierInput {
             vertex_welded: Vec::new(),
             vertex_region: Vec::new(),
         };
-        let mut vertex_of: HashMap<(u32, u32), u32> = HashMap::new();
+        let mut vertex_of: FxHashMap<(u32, u32), u32> = FxHashMap::default();
         for (corners, &region) in patches.triangles.iter().zip(&patches.triangle_region) {
             for &welded in corners {
                 let vertex = *vertex_of.entry((welded, region)).or_insert_with(|| {
@@ -161,7 +162,7 @@ impl SimplifierInput {
 
 /// Gives two-sided surfaces a second sheet of faces with vertices of its own, turned round.
 fn add_backs(mesh: &mut LightMesh, patches: &Patches) {
-    let mut back_of: HashMap<u32, u32> = HashMap::new();
+    let mut back_of: FxHashMap<u32, u32> = FxHashMap::default();
     for f in 0..mesh.faces.len() {
         let face = mesh.faces[f];
         if patches.regions[face.region as usize].two_sided {

@@ -13,6 +13,7 @@ pub mod scene;
 pub mod patches;
 pub mod decimate;
 pub mod planar;
+pub mod slivers;
 pub mod surface;
 pub mod clearance;
 pub mod signed_distance;
@@ -26,6 +27,7 @@ pub mod grid;
 pub mod write;
 
 pub mod bvh;
+pub mod grouped_bvh;
 pub mod topology;
 
 pub mod camera;

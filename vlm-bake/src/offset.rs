@@ -35,7 +35,7 @@ pub struct Offset {
     pub vertex_moved: Vec<f64>,
 }
 
-/// Moves the vertices of `mesh` inward. Faces of two-sided surfaces stay where they are: no place behind hides them, so they are
+/// Moves the vertices of `mesh` inward, each face by the clearance at least and `deepest` at most (metres). Faces of two-sided surfaces stay where they are: no place behind hides them, so they are
 /// tagged later.
 pub fn offset(
     mesh: &mut LightMesh,
@@ -44,21 +44,19 @@ pub fn offset(
     standing: &Standing,
     distance: &IslandDistance,
     clearance: f64,
+    deepest: f64,
 ) -> Offset {
     let target = MARGIN * clearance;
     let rest = mesh.positions.clone();
     let normals: Vec<DVec3> = (0..mesh.faces.len()).map(|f| mesh.normal(f)).collect();
     let incident = incident_faces(mesh, patches);
     let needed = |mesh: &LightMesh, f: usize| {
-        needed_depth(
-            &mesh.corners(f),
-            normals[f],
-            standing.of(f).iter().map(|&p| &points[p as usize]),
-            target,
-        )
+        needed_depth(&mesh.corners(f), normals[f], standing.of(f).iter().map(|&p| &points[p as usize]), target)
     };
-    let mut depth: Vec<f64> =
-        (0..mesh.faces.len()).into_par_iter().map(|f| needed(mesh, f).max(target)).collect();
+    // A face that would have to sink deeper than decimation can explain stands for something it does not resemble: it
+    // stays near the surface, fails the check, and is tagged.
+    let bounded = |depth: f64| if depth > deepest { target } else { depth.max(target) };
+    let mut depth: Vec<f64> = (0..mesh.faces.len()).into_par_iter().map(|f| bounded(needed(mesh, f))).collect();
     for _ in 0..ROUNDS {
         displace(mesh, &rest, &normals, &depth, &incident);
         pull_inside(mesh, patches, &incident, distance, target);
@@ -75,7 +73,7 @@ pub fn offset(
             break;
         }
         for f in failing {
-            depth[f] += needed(mesh, f).max(0.25 * target);
+            depth[f] = bounded(depth[f] + needed(mesh, f).max(0.25 * target));
         }
     }
     let vertex_moved = mesh.positions.iter().zip(&rest).map(|(moved, at)| moved.distance(*at)).collect();
@@ -113,8 +111,7 @@ fn incident_faces(mesh: &LightMesh, patches: &Patches) -> Vec<Vec<u32>> {
 /// Moves every vertex from its place of rest to satisfy the depths of its faces.
 fn displace(mesh: &mut LightMesh, rest: &[DVec3], normals: &[DVec3], depth: &[f64], incident: &[Vec<u32>]) {
     mesh.positions.par_iter_mut().zip(rest).zip(incident).for_each(|((position, at), faces)| {
-        *position =
-            *at + shortest_displacement(faces.iter().map(|&f| (normals[f as usize], depth[f as usize])));
+        *position = *at + shortest_displacement(faces.iter().map(|&f| (normals[f as usize], depth[f as usize])));
     });
 }
 
@@ -179,9 +176,7 @@ mod tests {
 
     #[test]
     fn opposite_walls_stop_at_the_limit() {
-        let moved = shortest_displacement(
-            [(DVec3::Z, 0.1), (dvec3(0.1, 0.0, -1.0).normalize_or_zero(), 0.1)].into_iter(),
-        );
+        let moved = shortest_displacement([(DVec3::Z, 0.1), (dvec3(0.1, 0.0, -1.0).normalize_or_zero(), 0.1)].into_iter());
         assert!(moved.length() <= 0.4 + 1e-9);
     }
 }

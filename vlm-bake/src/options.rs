@@ -72,9 +72,9 @@ impl BakeOptions {
     #[must_use]
     pub fn preset(preset: Preset, visible_triangles: usize) -> Self {
         let (samples, range) = match preset {
-            Preset::Draft => (2, 6.0),
-            Preset::Game => (4, 12.0),
-            Preset::Quality => (16, 24.0),
+            Preset::Draft => (2, 4.5),
+            Preset::Game => (4, 8.0),
+            Preset::Quality => (16, 16.0),
         };
         Self {
             preset,

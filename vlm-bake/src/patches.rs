@@ -5,10 +5,10 @@
 //! *regions*: connected, of one primitive, without a hard step of albedo inside. Borders between regions survive
 //! decimation as seams.
 
-use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
 use glam::{DVec3, Vec3};
+use rustc_hash::FxHashMap;
 use petgraph::unionfind::UnionFind;
 
 use crate::scene::{Scene, Surface};
@@ -96,8 +96,8 @@ fn makes_lights(scene: &Scene, triangle: usize, surface: &Surface) -> bool {
 /// Collects the triangles that make lights, vertices welded by exact position within each object.
 fn weld(scene: &Scene, surfaces: &[Surface]) -> Patches {
     let mut patches = Patches::default();
-    let mut vertex_of: HashMap<(u32, [u32; 3]), u32> = HashMap::new();
-    let mut triangle_at: HashMap<[u32; 3], (u32, bool)> = HashMap::new();
+    let mut vertex_of: FxHashMap<(u32, [u32; 3]), u32> = FxHashMap::default();
+    let mut triangle_at: FxHashMap<[u32; 3], (u32, bool)> = FxHashMap::default();
     for (t, corners) in scene.triangles.iter().enumerate() {
         if !makes_lights(scene, t, &surfaces[t]) {
             continue;
@@ -184,8 +184,8 @@ fn step(a: &Surface, b: &Surface) -> f32 {
 
 /// Numbers islands and regions in the order in which their first triangles come.
 fn number(patches: &mut Patches, scene: &Scene, islands: &mut UnionFind<u32>, regions: &mut UnionFind<u32>) {
-    let mut island_of: HashMap<u32, u32> = HashMap::new();
-    let mut region_of: HashMap<u32, u32> = HashMap::new();
+    let mut island_of: FxHashMap<u32, u32> = FxHashMap::default();
+    let mut region_of: FxHashMap<u32, u32> = FxHashMap::default();
     for t in 0..patches.triangles.len() as u32 {
         let next_island = island_of.len() as u32;
         let island = *island_of.entry(islands.find_mut(t)).or_insert(next_island);

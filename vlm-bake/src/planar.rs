@@ -1,8 +1,7 @@
 //! Merges coplanar faces and triangulates the merged polygons again, constrained Delaunay, without the vertices that no corner needs.
 
-use std::collections::HashMap;
-
 use glam::DVec3;
+use rustc_hash::FxHashMap;
 use petgraph::unionfind::UnionFind;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
 
@@ -53,7 +52,7 @@ fn coplanar_groups(mesh: &LightMesh) -> Vec<u32> {
             plane[joined.find_mut(a) as usize] = n;
         }
     }
-    let mut first: HashMap<u32, u32> = HashMap::new();
+    let mut first: FxHashMap<u32, u32> = FxHashMap::default();
     (0..triangles.len() as u32).map(|f| *first.entry(joined.find_mut(f)).or_insert(f)).collect()
 }
 
@@ -122,8 +121,7 @@ fn triangulate(mesh: &LightMesh, group: &[u32], needed: &[bool]) -> Option<Vec<F
     let outline = outline(mesh, group, needed)?;
     let cdt = constrained(mesh, &outline, normal)?;
     let faces = inside_faces(&cdt, mesh.faces[*group.first()? as usize]);
-    let doubled: f64 =
-        faces.iter().map(|f| cross_of(f.vertices.map(|v| mesh.positions[v as usize])).dot(normal)).sum();
+    let doubled: f64 = faces.iter().map(|f| cross_of(f.vertices.map(|v| mesh.positions[v as usize])).dot(normal)).sum();
     let kept = (0.5 * doubled - area).abs() <= AREA_TOLERANCE * area;
     (kept && !faces.is_empty() && faces.len() <= group.len()).then_some(faces)
 }
@@ -138,8 +136,7 @@ fn outline(mesh: &LightMesh, group: &[u32], needed: &[bool]) -> Option<Vec<[u32;
             [v[usize::from(uses[0].side)], v[(usize::from(uses[0].side) + 1) % 3]]
         })
         .collect();
-    let next: HashMap<u32, u32> =
-        boundary.iter().filter(|e| !needed[e[0] as usize]).map(|e| (e[0], e[1])).collect();
+    let next: FxHashMap<u32, u32> = boundary.iter().filter(|e| !needed[e[0] as usize]).map(|e| (e[0], e[1])).collect();
     let mut outline = Vec::new();
     for &[from, mut to] in boundary.iter().filter(|e| needed[e[0] as usize]) {
         for _ in 0..=next.len() {
@@ -177,11 +174,9 @@ fn constrained(
         })
         .collect();
     let index = |vertex: &u32| corners.binary_search(vertex).ok();
-    let constraints =
-        outline.iter().map(|[a, b]| Some([index(a)?, index(b)?])).collect::<Option<Vec<_>>>()?;
+    let constraints = outline.iter().map(|[a, b]| Some([index(a)?, index(b)?])).collect::<Option<Vec<_>>>()?;
     let mut conflicts = 0;
-    let cdt = ConstrainedDelaunayTriangulation::try_bulk_load_cdt(vertices, constraints, |_| conflicts += 1)
-        .ok()?;
+    let cdt = ConstrainedDelaunayTriangulation::try_bulk_load_cdt(vertices, constraints, |_| conflicts += 1).ok()?;
     (conflicts == 0 && cdt.num_vertices() == corners.len()).then_some(cdt)
 }
 
@@ -204,6 +199,8 @@ fn inside_faces(cdt: &ConstrainedDelaunayTriangulation<PlaneVertex>, like: Face)
     }
     cdt.inner_faces()
         .filter(|face| parity[face.fix().index()] == Some(true))
-        .map(|face| Face { vertices: face.vertices().map(|v| v.data().vertex), ..like })
+        .map(|face| {
+            Face { vertices: face.vertices().map(|v| v.data().vertex), ..like }
+        })
         .collect()
 }

@@ -1,25 +1,18 @@
-//! Stage 5: divides large and thin faces until the budget of lights is spent.
+//! Stage 8: divides large faces until the budget of lights is spent.
 //!
-//! A light has one radiosity, so a large one blurs the light and shadow that falls on its surface; and one whose aspect ratio
-//! exceeds [`MAX_ASPECT`] has no accurate form factor in single precision. Both are cured by cutting the longest edge in
-//! half, which never makes the least angle smaller than half of what it was (Rosenberg and Stenger, "A lower bound on the angles of
+//! A light has one radiosity, so a large one blurs the light and shadow that falls on its surface. It is cut in half across its
+//! longest edge, which never makes the least angle smaller than half of what it was (Rosenberg and Stenger, "A lower bound on the angles of
 //! triangles constructed by bisecting the longest side", 1975). The parts lie in the plane of their face, so whatever
 //! `verify` proved for the face holds for them.
 
 use std::cmp::Ordering;
-use std::collections::{BinaryHeap, HashMap};
+use std::collections::BinaryHeap;
 
 use glam::DVec3;
+use rustc_hash::FxHashMap;
 
 use crate::decimate::LightMesh;
-use crate::topology::{aspect_ratio, cross_of};
-
-/// The greatest aspect ratio of a light (longest edge over height).
-pub const MAX_ASPECT: f64 = 100.0;
-
-/// A thin face that would need more cuts than this is dropped instead; its area is below a part in a thousand of a square on its
-/// longest edge.
-const MOST_CUTS: usize = 64;
+use crate::topology::cross_of;
 
 /// The final lights, in world space.
 #[derive(Clone, Debug, Default)]
@@ -80,11 +73,10 @@ impl Eq for Candidate {}
 /// 0 makes no lights.
 #[must_use]
 pub fn refine(mesh: &LightMesh, density: &[f64], budget: usize) -> Lights {
-    let mut cutter =
-        Cutter { positions: mesh.positions.clone(), lights: Vec::new(), midpoints: HashMap::new() };
+    let mut cutter = Cutter { positions: mesh.positions.clone(), lights: Vec::new(), midpoints: FxHashMap::default() };
     for (f, face) in mesh.faces.iter().enumerate() {
         if density[f] > 0.0 {
-            cutter.add_shapely(Light { vertices: face.vertices, face: f as u32 });
+            cutter.lights.push(Light { vertices: face.vertices, face: f as u32 });
         }
     }
     let mut queue: BinaryHeap<Candidate> =
@@ -102,28 +94,12 @@ pub fn refine(mesh: &LightMesh, density: &[f64], budget: usize) -> Lights {
 struct Cutter {
     positions: Vec<DVec3>,
     lights: Vec<Light>,
-    midpoints: HashMap<[u32; 2], u32>,
+    midpoints: FxHashMap<[u32; 2], u32>,
 }
 
 impl Cutter {
     fn corners(&self, light: &Light) -> [DVec3; 3] {
         light.vertices.map(|v| self.positions[v as usize])
-    }
-
-    /// Adds a light, in parts if its aspect ratio is too large, or not at all where it has next to no area.
-    fn add_shapely(&mut self, light: Light) {
-        let aspect = aspect_ratio(self.corners(&light));
-        if aspect > MAX_ASPECT * MOST_CUTS as f64 {
-            return;
-        }
-        let mut waiting = vec![light];
-        while let Some(light) = waiting.pop() {
-            if aspect_ratio(self.corners(&light)) > MAX_ASPECT {
-                waiting.extend(self.halves(&light));
-            } else {
-                self.lights.push(light);
-            }
-        }
     }
 
     /// Longest edge squared, weighed by the density.
@@ -162,6 +138,7 @@ impl Cutter {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::topology::aspect_ratio;
     use crate::decimate::Face;
     use glam::dvec3;
 
@@ -181,14 +158,5 @@ mod tests {
         assert!((area - 1.0).abs() < 1e-12);
         let worst = (0..100).map(|l| aspect_ratio(lights.corners(l))).fold(0.0, f64::max);
         assert!(worst < 6.0, "bisection keeps the shape, but made an aspect ratio of {worst}");
-    }
-
-    #[test]
-    fn a_needle_is_cut_into_shapely_parts() {
-        let mesh = one_face([dvec3(0.0, 0.0, 0.0), dvec3(10.0, 0.0, 0.0), dvec3(5.0, 0.02, 0.0)]);
-        assert!(aspect_ratio(mesh.corners(0)) > MAX_ASPECT);
-        let lights = refine(&mesh, &[1.0], 1);
-        assert!(lights.lights.len() > 1);
-        assert!((0..lights.lights.len()).all(|l| aspect_ratio(lights.corners(l)) <= MAX_ASPECT));
     }
 }

@@ -11,7 +11,7 @@ use glam::{DVec3, Vec3, Vec3A};
 use rayon::prelude::*;
 use std::f32::consts::PI;
 
-use crate::bvh::triangle::closest_point;
+use crate::bvh::nearest::closest_point;
 use crate::decimate::LightMesh;
 use crate::patches::Patches;
 use crate::refine::Lights;

@@ -6,9 +6,9 @@
 
 use std::f64::consts::PI;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
-use crate::bvh::Bvh;
+use crate::grouped_bvh::GroupedBvh;
 use crate::patches::Patches;
 use crate::topology::{cross_of, edge_uses, edges};
 
@@ -19,8 +19,7 @@ const ON_FEATURE: f64 = 1e-4;
 /// Signed distances to the islands of the visible surface.
 pub struct IslandDistance<'a> {
     patches: &'a Patches,
-    origin: DVec3,
-    bvh: Bvh,
+    islands: GroupedBvh,
     vertex_normals: Vec<DVec3>,
     edge_normals: Vec<[DVec3; 3]>,
 }
@@ -38,22 +37,20 @@ impl<'a> IslandDistance<'a> {
     /// Prepares the queries.
     #[must_use]
     pub fn new(patches: &'a Patches) -> Self {
-        let origin = patches.positions.first().copied().unwrap_or_default();
-        let positions: Vec<Vec3> = patches.positions.iter().map(|p| (p - origin).as_vec3()).collect();
-        let bvh = Bvh::new(&positions, &patches.triangles);
+        let island = |t: usize| patches.region(t).island;
+        let islands = GroupedBvh::new(&patches.positions, &patches.triangles, island, patches.islands as usize);
         let normals: Vec<DVec3> =
             (0..patches.triangles.len()).map(|t| cross_of(patches.corners(t)).normalize_or_zero()).collect();
         let vertex_normals = vertex_normals(patches, &normals);
         let edge_normals = edge_normals(patches, &normals);
-        Self { patches, origin, bvh, vertex_normals, edge_normals }
+        Self { patches, islands, vertex_normals, edge_normals }
     }
 
     /// The nearest place of an island to `p`; `None` if the island has no triangle.
     #[must_use]
     pub fn at(&self, p: DVec3, island: u32) -> Option<SignedNear> {
-        let local = p - self.origin;
-        let of_island = |t: u32| self.patches.region(t as usize).island == island;
-        let near = self.bvh.closest(local.as_vec3(), f32::INFINITY, of_island)?;
+        let local = p - self.islands.origin();
+        let near = self.islands.closest(island, p, f64::INFINITY, |_| true)?;
         let nearest = near.point.as_dvec3();
         let normal = self.normal_at(near.triangle, nearest)?;
         let away = local - nearest;
@@ -65,7 +62,7 @@ impl<'a> IslandDistance<'a> {
     /// The pseudonormal of the feature of a triangle on which a point lies.
     fn normal_at(&self, triangle: u32, local: DVec3) -> Option<DVec3> {
         let t = triangle as usize;
-        let [a, b, c] = self.patches.corners(t).map(|p| p - self.origin);
+        let [a, b, c] = self.patches.corners(t).map(|p| p - self.islands.origin());
         let n = (b - a).cross(c - a);
         let beside = |from: DVec3, to: DVec3| {
             (to - from).cross(local - from).dot(n) <= ON_FEATURE * n.length_squared()

@@ -3,8 +3,8 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use crate::bvh::Bvh;
 use crate::decimate::LightMesh;
+use crate::grouped_bvh::GroupedBvh;
 use crate::patches::Patches;
 use crate::topology::cross_of;
 
@@ -90,34 +90,24 @@ pub fn spread_over([a, b, c]: [DVec3; 3], count: u32) -> impl Iterator<Item = DV
 /// same way. `None` where decimation left none within `reach` metres: the point's light is lost, and the report says how
 /// much.
 #[must_use]
-pub fn stand_ins(
-    points: &[SurfacePoint],
-    patches: &Patches,
-    mesh: &LightMesh,
-    reach: f64,
-) -> Vec<Option<u32>> {
-    let origin = mesh.positions.first().copied().unwrap_or_default();
-    let positions: Vec<Vec3> = mesh.positions.iter().map(|p| (p - origin).as_vec3()).collect();
+pub fn stand_ins(points: &[SurfacePoint], patches: &Patches, mesh: &LightMesh, reach: f64) -> Vec<Option<u32>> {
     let triangles: Vec<[u32; 3]> = mesh.faces.iter().map(|f| f.vertices).collect();
     let normals: Vec<DVec3> = (0..mesh.faces.len()).into_par_iter().map(|f| mesh.normal(f)).collect();
-    let bvh = Bvh::new(&positions, &triangles);
+    let region = |f: usize| mesh.faces[f].region;
+    let island = |f: usize| patches.regions[region(f) as usize].island;
+    let regions = GroupedBvh::new(&mesh.positions, &triangles, region, patches.regions.len());
+    let islands = GroupedBvh::new(&mesh.positions, &triangles, island, patches.islands as usize);
     points
         .par_iter()
         .map(|point| {
-            let region = patches.triangle_region[point.triangle as usize];
-            let place = &patches.regions[region as usize];
+            let own = patches.triangle_region[point.triangle as usize];
+            let place = &patches.regions[own as usize];
             let alike = |f: u32| {
-                mesh.faces[f as usize].back == point.back
-                    && normals[f as usize].dot(point.normal) > LEAST_COSINE
+                mesh.faces[f as usize].back == point.back && normals[f as usize].dot(point.normal) > LEAST_COSINE
             };
-            let near = (point.position - origin).as_vec3();
-            let own = |f: u32| mesh.faces[f as usize].region == region && alike(f);
-            let kin = |f: u32| {
-                let other = &patches.regions[mesh.faces[f as usize].region as usize];
-                (other.island, other.primitive) == (place.island, place.primitive) && alike(f)
-            };
-            let found = bvh.closest(near, reach as f32, own).or_else(|| bvh.closest(near, reach as f32, kin));
-            found.map(|closest| closest.triangle)
+            let kin = |f: u32| patches.regions[region(f as usize) as usize].primitive == place.primitive && alike(f);
+            let found = regions.closest(own, point.position, reach, alike);
+            found.or_else(|| islands.closest(place.island, point.position, reach, kin)).map(|near| near.triangle)
         })
         .collect()
 }

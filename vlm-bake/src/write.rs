@@ -1,14 +1,15 @@
 //! Stage 10: the finished lights as a [`VlmAsset`], in the spaces of their nodes.
 
-use std::collections::HashMap;
-
 use glam::{DMat3, DMat4, DVec3, Vec3};
+use rustc_hash::FxHashMap;
 use vlm_format::{Grid, Sample, Settings, Vlm, VlmAsset};
 
 use crate::options::BakeOptions;
 use crate::samples::BakedLight;
 use crate::scene::Scene;
+use crate::slivers::MAX_ASPECT;
 use crate::tag::Tags;
+use crate::topology::aspect_ratio;
 
 /// The tool's name and version as files carry it.
 pub const GENERATOR: &str = concat!("vlm-bake ", env!("CARGO_PKG_VERSION"));
@@ -35,7 +36,7 @@ pub fn assemble(
         grid,
         ..VlmAsset::default()
     };
-    let mut ids: HashMap<String, u32> = HashMap::new();
+    let mut ids: FxHashMap<String, u32> = FxHashMap::default();
     for run in lights.chunk_by(|a, b| (a.object, a.authored) == (b.object, b.authored)) {
         append(&mut asset, scene, run, &mut ids);
     }
@@ -59,13 +60,13 @@ fn settings(options: &BakeOptions, grid: Option<&Grid>) -> Settings {
 }
 
 /// Appends the lights of one object.
-fn append(asset: &mut VlmAsset, scene: &Scene, run: &[BakedLight], ids: &mut HashMap<String, u32>) {
+fn append(asset: &mut VlmAsset, scene: &Scene, run: &[BakedLight], ids: &mut FxHashMap<String, u32>) {
     let Some(first) = run.first() else { return };
     let object = &scene.objects[first.object as usize];
     let to_node = NodeSpace::new(object.world_from_node);
     let lights = [asset.triangles.len() as u32, run.len() as u32];
     let first_vertex = asset.positions.len() as u32;
-    let mut vertex_of: HashMap<[u32; 3], u32> = HashMap::new();
+    let mut vertex_of: FxHashMap<[u32; 3], u32> = FxHashMap::default();
     for light in run {
         let mut corners = light.corners.map(|p| {
             let p = to_node.point(p);
@@ -98,7 +99,7 @@ fn append(asset: &mut VlmAsset, scene: &Scene, run: &[BakedLight], ids: &mut Has
 }
 
 /// An id that no other VLM of the file has.
-fn unique(path: &str, ids: &mut HashMap<String, u32>) -> String {
+fn unique(path: &str, ids: &mut FxHashMap<String, u32>) -> String {
     let uses = ids.entry(path.to_owned()).or_insert(0);
     *uses += 1;
     if *uses == 1 { path.to_owned() } else { unique(&format!("{path}#{uses}"), ids) }
@@ -131,9 +132,14 @@ impl NodeSpace {
     }
 }
 
-/// True if a light can be expressed in the space of its node: the node's transform has an inverse.
+/// True if a light survives the way into the file: its node's transform has an inverse, and in the node's space, in single
+/// precision, it is no thinner than a light may be.
 #[must_use]
 pub fn placeable(scene: &Scene, light: &BakedLight) -> bool {
     let world_from_node = scene.objects[light.object as usize].world_from_node;
-    world_from_node.determinant() != 0.0 && world_from_node.inverse().is_finite()
+    let to_node = NodeSpace::new(world_from_node);
+    let stored = light.corners.map(|p| to_node.point(p));
+    world_from_node.determinant() != 0.0
+        && stored.iter().all(|p| p.is_finite())
+        && aspect_ratio(stored.map(|p| p.as_dvec3())).max(aspect_ratio(light.corners)) <= MAX_ASPECT
 }

@@ -2,7 +2,7 @@
 
 use super::material::{UvSource, UvSources};
 use super::{Error, Scene, ScenePrimitive};
-use glam::{DMat3, DMat4, DVec3, Vec2, Vec3};
+use glam::{DMat3, DMat4, DVec3, Vec2, Vec3, Vec3Swizzles};
 use gltf::Semantic;
 use gltf::mesh::Mode;
 use vlm_format::GltfFile;
@@ -222,15 +222,16 @@ pub(super) fn is_mirrored(world_from_local: DMat4) -> bool {
     x.cross(y).dot(z) < 0.0
 }
 
-/// False if the triangle's height is within the rounding of its coordinates: its normal would be noise.
+/// False if the triangle's area is within the rounding of its coordinates: its normal would be noise.
+///
+/// With edges u and v whose coordinates err by up to d per axis, u x v errs by up to `(|u| + |v|) x d` with every
+/// product taken positive.
 fn has_area(corners: [Vec3; 3]) -> bool {
-    let [a, b, c] = corners;
-    let longest = [(a, b), (b, c), (c, a)]
-        .map(|(p, q)| p.as_dvec3().distance(q.as_dvec3()))
-        .into_iter()
-        .fold(0.0, f64::max);
-    let coordinate = corners.map(|p| p.abs().max_element()).into_iter().fold(0.0, f32::max);
-    area_normal(corners).length() > longest * f64::from(coordinate * f32::EPSILON)
+    let [a, b, c] = corners.map(|p| p.as_dvec3());
+    let edges = (b - a).abs() + (c - a).abs();
+    let rounding = a.abs().max(b.abs()).max(c.abs()) * f64::from(f32::EPSILON);
+    let noise = edges.yzx() * rounding.zxy() + edges.zxy() * rounding.yzx();
+    area_normal(corners).length_squared() > noise.length_squared()
 }
 
 /// Normal of a counter-clockwise triangle, as long as twice its area.

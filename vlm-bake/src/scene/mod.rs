@@ -36,7 +36,7 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// Authored light meshes: they are not part of the visible triangles.
     pub authored: Vec<AuthoredMesh>,
-    /// Triangles of the file that were left out because their height is within the rounding of their coordinates.
+    /// Triangles of the file that were left out because their area is within the rounding of their coordinates.
     pub degenerate_triangles: usize,
     /// What was left out or guessed, for the user to read: place and reason.
     pub notes: Vec<String>,
@@ -208,6 +208,9 @@ mod authored;
 mod light;
 mod camera;
 mod defaults;
+
+#[cfg(test)]
+mod tests;
 
 pub use authored::Volume;
 pub use load::{Error, LoadOptions, load};

@@ -13,7 +13,8 @@ pub(super) struct PlacedNode<'a> {
 }
 
 /// The nodes of the default scene, else of the first, else (a file without scenes) of the whole file; parents before
-/// children, siblings in the file's order. A node that is reached twice counts once, so this always ends.
+/// children, siblings in the file's order. What KHR_node_visibility hides is left out, with all below it. A node that
+/// is reached twice counts once, so this always ends.
 pub(super) fn drawn_nodes(document: &gltf::Document) -> Vec<PlacedNode<'_>> {
     let scene = document.default_scene().or_else(|| document.scenes().next());
     let mut pending: Vec<_> = match scene {
@@ -26,7 +27,7 @@ pub(super) fn drawn_nodes(document: &gltf::Document) -> Vec<PlacedNode<'_>> {
     let mut seen = vec![false; document.nodes().len()];
     while let Some((node, parent)) = pending.pop() {
         match seen.get_mut(node.index()) {
-            Some(seen) if !*seen => *seen = true,
+            Some(seen) if !*seen && is_visible(&node) => *seen = true,
             _ => continue,
         }
         let world_from_parent =
@@ -54,6 +55,11 @@ pub(super) fn path(nodes: &[PlacedNode], index: usize) -> String {
 /// The node's name, or `node 7`.
 pub(super) fn node_name(node: &gltf::Node) -> String {
     node.name().map_or_else(|| format!("node {}", node.index()), str::to_owned)
+}
+
+fn is_visible(node: &gltf::Node) -> bool {
+    let visible = node.extension_value("KHR_node_visibility").and_then(|extension| extension.get("visible"));
+    visible != Some(&serde_json::Value::Bool(false))
 }
 
 fn root_nodes(document: &gltf::Document) -> Vec<gltf::Node<'_>> {
