@@ -16,18 +16,9 @@ const FILES: &[&str] = &[
     "blender_io/19_sheen/19_sheen.gltf",
 ];
 
-/// The folder with the node modules, `VLM_NPM` or `target/npm`. Without it, the tests read "ignored", or fail where
-/// `VLM_REQUIRE_NPM=1` promises that it is there.
-fn node_modules() -> Option<PathBuf> {
-    let default = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/npm");
-    let folder = std::env::var_os("VLM_NPM").map_or(default, PathBuf::from);
-    if folder.join("node_modules/gltf-validator").is_dir() {
-        return Some(folder);
-    }
-    let required = std::env::var("VLM_REQUIRE_NPM").is_ok_and(|value| value == "1");
-    assert!(!required, "gltf-validator is not in {} although VLM_REQUIRE_NPM=1", folder.display());
-    eprintln!("ignored: gltf-validator is not in {}", folder.display());
-    None
+/// The folder with the node modules that `tests/run` installs.
+fn node_modules() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("js")
 }
 
 /// The validator's report on each file.
@@ -43,8 +34,9 @@ fn errors(report: &Value) -> Vec<&Value> {
 }
 
 #[test]
+#[cfg_attr(not(all(has_validator, has_corpus)), ignore = "needs the corpus and `npm ci --prefix tests/js`")]
 fn written_files_have_no_errors() {
-    let (Some(modules), Some(corpus)) = (node_modules(), assets::find("corpus")) else { return };
+    let (modules, corpus) = (node_modules(), assets::path("corpus"));
     let folder = tempfile::tempdir().unwrap();
     let mut written = Vec::new();
     for (i, name) in FILES.iter().enumerate() {
@@ -70,8 +62,9 @@ fn written_files_have_no_errors() {
 }
 
 #[test]
+#[cfg_attr(not(all(has_validator, has_corpus)), ignore = "needs the corpus and `npm ci --prefix tests/js`")]
 fn a_broken_file_has_errors() {
-    let (Some(modules), Some(corpus)) = (node_modules(), assets::find("corpus")) else { return };
+    let (modules, corpus) = (node_modules(), assets::path("corpus"));
     let file = GltfFile::open(&corpus.join("generated/sparse_positions.gltf")).unwrap();
     let target =
         Target { container: Container::Gltf { embedded: true }, file_name: String::from("broken.gltf") };
