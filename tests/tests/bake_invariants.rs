@@ -86,8 +86,8 @@ fn faults(scene: &Scene, Bake { asset, report }: &Bake) -> Vec<String> {
     check(finite, "a number is not finite".to_owned());
     let lit = lights.iter().filter(|l| lights_itself(l)).count();
     check(lit == 0, format!("{lit} untagged lights light a point for which they stand"));
-    let (extra, missing) =
-        grid_errors(asset.grid.as_ref().unwrap(), &lights, f64::from(asset.settings.range));
+    let range = f64::from(asset.settings.range);
+    let (extra, missing) = asset.grid.as_ref().map_or((0, 0), |grid| grid_errors(grid, &lights, range));
     check(extra == 0, format!("{extra} lights listed in cells that they do not reach"));
     check(missing == 0, format!("{missing} lights missing from cells that they reach"));
     faults
