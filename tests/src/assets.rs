@@ -1,12 +1,16 @@
 //! Where the scenes and odd files are that tests run on; they are not part of the repository.
-//!
-//! A test that needs them bears `#[cfg_attr(not(has_scenes), ignore = "...")]`, or `has_corpus`.
 
 use std::path::PathBuf;
 
-/// A file or folder of the test assets: in `VLM_ASSETS` as it was at build time, else in `../shared/assets` beside the
-/// repository. It need not exist.
-#[must_use]
-pub fn path(relative: &str) -> PathBuf {
-    PathBuf::from(env!("VLM_ASSETS_FOLDER")).join(relative)
+/// A file or folder of the test assets, `VLM_ASSETS` first, then `../shared/assets` beside the repository.
+///
+/// Where it is absent, says so on stderr and returns `None`: the test then returns, and reads "ignored".
+pub fn find(relative: &str) -> Option<PathBuf> {
+    let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/assets");
+    let roots = std::env::var_os("VLM_ASSETS").map(PathBuf::from).into_iter().chain([beside]);
+    let found = roots.map(|root| root.join(relative)).find(|path| path.exists());
+    if found.is_none() {
+        eprintln!("ignored: `{relative}` is neither in VLM_ASSETS nor in ../shared/assets");
+    }
+    found
 }

@@ -1,5 +1,7 @@
 //! Scenes with a known answer, for every method that must give it.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use glam::Vec3;
 use vlm_bake::progress::Silent;
 use vlm_bake::render::{Method, RenderOptions, render};
@@ -21,7 +23,8 @@ fn mean(indirect: &[Vec3]) -> f64 {
 }
 
 fn indirect(scene: &Scene, asset: &VlmAsset, camera: &Camera, method: Method) -> Vec<Vec3> {
-    let options = RenderOptions { width: SIZE, height: SIZE, method, samples: SAMPLES };
+    let options =
+        RenderOptions { width: SIZE, height: SIZE, method, samples: SAMPLES, ..RenderOptions::default() };
     render(scene, Some(asset), camera, &options, &Silent).unwrap().indirect
 }
 

@@ -18,7 +18,7 @@ struct Light {
 }
 
 fn open(folder: &str, name: &str) -> Scene {
-    let path = assets::path(folder).join(name);
+    let path = assets::find(folder).unwrap().join(name);
     load(&GltfFile::open(&path).unwrap(), &LoadOptions::default()).unwrap()
 }
 
@@ -151,7 +151,7 @@ fn reaches(light: &Light, [low, high]: [DVec3; 2], range: f64, slack: f64) -> bo
 }
 
 fn check_folder(folder: &str, skip: &[&str], most_lights: u32) {
-    let mut names: Vec<String> = std::fs::read_dir(assets::path(folder))
+    let mut names: Vec<String> = std::fs::read_dir(assets::find(folder).unwrap())
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .filter(|name| name.ends_with(".glb") && !skip.contains(&name.as_str()))

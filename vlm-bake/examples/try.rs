@@ -28,7 +28,7 @@ fn main() {
     if let Some(m) = a.get(3) {
         let mut cams = scene.cameras.clone();
         if cams.is_empty() {
-            cams.push(vlm_bake::camera::framing_camera(&scene));
+            cams = scene.cameras_or_default().into_owned();
         }
         let (w, h, spp) = (a[4].parse().unwrap(), a[5].parse().unwrap(), a[6].parse().unwrap());
         let (_, mut truth): (f64, Vec<glam::Vec3>) = (0.0, vec![]);
@@ -43,8 +43,8 @@ fn main() {
                 &scene,
                 Some(&b.asset),
                 &cams[0],
-                &RenderOptions { width: w, height: h, method, samples: spp },
-                &|_| {},
+                &RenderOptions { width: w, height: h, method, samples: spp, ..RenderOptions::default() },
+                &Silent,
             )
             .unwrap();
             write_png(&im, format!("/tmp/{name}.png").as_ref(), None).unwrap();

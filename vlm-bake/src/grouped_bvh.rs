@@ -33,7 +33,8 @@ impl GroupedBvh {
             // Only the group's own vertices: a tree's precision and cost follow what it is given.
             let corners = members.iter().flat_map(|&t| triangles[t as usize]);
             let local: Vec<Vec3> = corners.map(|v| (positions[v as usize] - origin).as_vec3()).collect();
-            let indices: Vec<[u32; 3]> = (0..members.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+            let indices: Vec<[u32; 3]> =
+                (0..members.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
             (Bvh::new(&local, &indices), members)
         };
         Self { origin, groups: members.into_par_iter().map(tree).collect() }

@@ -102,3 +102,56 @@ fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), PictureError> {
     file.persist(path).map_err(|e| error(e.error))?;
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shade::SurfacePoint;
+
+    /// Two pixels: a grey surface, and nothing.
+    fn rendering() -> Rendering {
+        let point = SurfacePoint {
+            triangle: 0,
+            position: Vec3::ZERO,
+            normal: Vec3::Z,
+            geometric_normal: Vec3::Z,
+            albedo: Vec3::splat(0.5),
+            emission: Vec3::ZERO,
+        };
+        Rendering {
+            gbuffer: GBuffer { width: 2, height: 1, points: vec![Some(point), None] },
+            direct: vec![Vec3::splat(PI), Vec3::ZERO],
+            indirect: vec![Vec3::new(PI, 0.1, 1e6), Vec3::ZERO],
+            ..Rendering::default()
+        }
+    }
+
+    #[test]
+    fn irradiance_survives_the_file_to_the_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("e.exr");
+        write_irradiance(&rendering(), &path).unwrap();
+        assert_eq!(read_irradiance(&path).unwrap(), (2, 1, rendering().indirect));
+    }
+
+    #[test]
+    fn pictures_show_reflected_light_and_the_background() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("p.png");
+        assert!((radiance(&rendering())[0].x - 1.0).abs() < 1e-6, "0.5 / pi * (pi + pi)");
+        let exposure = write_png(&rendering(), &path, Some(0.5)).unwrap();
+        let image = image::open(&path).unwrap().into_rgb8();
+        assert_eq!((exposure, image.dimensions()), (0.5, (2, 1)));
+        assert_eq!(image.get_pixel(1, 0).0, BACKGROUND);
+        assert!(image.get_pixel(0, 0).0[2] > 200, "the bright channel");
+    }
+
+    #[test]
+    fn a_missing_folder_is_named_and_nothing_is_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("none").join("p.png");
+        let message = write_png(&rendering(), &path, None).unwrap_err().to_string();
+        assert!(message.contains("none") && message.contains("folder"), "{message}");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}

@@ -1,8 +1,8 @@
 //! Merges coplanar faces and triangulates the merged polygons again, constrained Delaunay, without the vertices that no corner needs.
 
 use glam::DVec3;
-use rustc_hash::FxHashMap;
 use petgraph::unionfind::UnionFind;
+use rustc_hash::FxHashMap;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
 
 use crate::decimate::{Face, LightMesh};
@@ -121,7 +121,8 @@ fn triangulate(mesh: &LightMesh, group: &[u32], needed: &[bool]) -> Option<Vec<F
     let outline = outline(mesh, group, needed)?;
     let cdt = constrained(mesh, &outline, normal)?;
     let faces = inside_faces(&cdt, mesh.faces[*group.first()? as usize]);
-    let doubled: f64 = faces.iter().map(|f| cross_of(f.vertices.map(|v| mesh.positions[v as usize])).dot(normal)).sum();
+    let doubled: f64 =
+        faces.iter().map(|f| cross_of(f.vertices.map(|v| mesh.positions[v as usize])).dot(normal)).sum();
     let kept = (0.5 * doubled - area).abs() <= AREA_TOLERANCE * area;
     (kept && !faces.is_empty() && faces.len() <= group.len()).then_some(faces)
 }
@@ -136,7 +137,8 @@ fn outline(mesh: &LightMesh, group: &[u32], needed: &[bool]) -> Option<Vec<[u32;
             [v[usize::from(uses[0].side)], v[(usize::from(uses[0].side) + 1) % 3]]
         })
         .collect();
-    let next: FxHashMap<u32, u32> = boundary.iter().filter(|e| !needed[e[0] as usize]).map(|e| (e[0], e[1])).collect();
+    let next: FxHashMap<u32, u32> =
+        boundary.iter().filter(|e| !needed[e[0] as usize]).map(|e| (e[0], e[1])).collect();
     let mut outline = Vec::new();
     for &[from, mut to] in boundary.iter().filter(|e| needed[e[0] as usize]) {
         for _ in 0..=next.len() {
@@ -174,9 +176,11 @@ fn constrained(
         })
         .collect();
     let index = |vertex: &u32| corners.binary_search(vertex).ok();
-    let constraints = outline.iter().map(|[a, b]| Some([index(a)?, index(b)?])).collect::<Option<Vec<_>>>()?;
+    let constraints =
+        outline.iter().map(|[a, b]| Some([index(a)?, index(b)?])).collect::<Option<Vec<_>>>()?;
     let mut conflicts = 0;
-    let cdt = ConstrainedDelaunayTriangulation::try_bulk_load_cdt(vertices, constraints, |_| conflicts += 1).ok()?;
+    let cdt = ConstrainedDelaunayTriangulation::try_bulk_load_cdt(vertices, constraints, |_| conflicts += 1)
+        .ok()?;
     (conflicts == 0 && cdt.num_vertices() == corners.len()).then_some(cdt)
 }
 
@@ -199,8 +203,6 @@ fn inside_faces(cdt: &ConstrainedDelaunayTriangulation<PlaneVertex>, like: Face)
     }
     cdt.inner_faces()
         .filter(|face| parity[face.fix().index()] == Some(true))
-        .map(|face| {
-            Face { vertices: face.vertices().map(|v| v.data().vertex), ..like }
-        })
+        .map(|face| Face { vertices: face.vertices().map(|v| v.data().vertex), ..like })
         .collect()
 }

@@ -61,11 +61,13 @@ pub struct RenderOptions {
     pub method: Method,
     /// Directions per pixel of `reference`. Four times as many halve the noise or better, and take four times as long.
     pub samples: u32,
+    /// Cut the holes of alphaMode MASK into surfaces; else they count as solid. Every hit then costs a texture look-up.
+    pub alpha_masks: bool,
 }
 
 impl Default for RenderOptions {
     fn default() -> Self {
-        Self { width: 640, height: 480, method: Method::default(), samples: 256 }
+        Self { width: 640, height: 480, method: Method::default(), samples: 256, alpha_masks: false }
     }
 }
 
@@ -161,6 +163,7 @@ pub fn render(
 ) -> Result<Rendering, RenderError> {
     check_size(options)?;
     let trace = TraceScene::new(scene);
+    let trace = if options.alpha_masks { trace.with_alpha_masks() } else { trace };
     let gbuffer = GBuffer::trace(&trace, camera, options.width, options.height);
     let direct = gbuffer.direct_irradiance(&trace);
     let lights = asset.map_or(0, |asset| asset.triangles.len() as u32);

@@ -17,7 +17,12 @@ pub struct TraceScene<'a> {
     /// The punctual lights; the default light in a scene where nothing shines.
     pub lights: Vec<punctual::PunctualLight>,
     sides: Vec<Sides>,
+    /// True for triangles whose alpha mask is honoured. Empty when none is.
+    masked: Vec<bool>,
 }
+
+/// Coverage of an alpha mask from which rays are blocked.
+const SOLID: f32 = 0.5;
 
 /// How a triangle meets rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,17 +58,23 @@ impl<'a> TraceScene<'a> {
     pub fn new(scene: &'a Scene) -> Self {
         let sides = scene.triangle_primitive.iter().map(|&primitive| sides_of(scene, primitive)).collect();
         let lights = scene.lights_or_default().iter().map(punctual_light).collect();
-        Self { scene, bvh: Bvh::new(&scene.positions, &scene.triangles), lights, sides }
+        let bvh = Bvh::new(&scene.positions, &scene.triangles);
+        Self { scene, bvh, lights, sides, masked: Vec::new() }
+    }
+
+    /// The same, with holes where alphaMode MASK cuts them; [`TraceScene::new`] takes masked surfaces as solid. Every
+    /// hit on them then costs a texture look-up.
+    #[must_use]
+    pub fn with_alpha_masks(self) -> Self {
+        let is_masked = |triangle| self.scene.material_of(triangle).is_some_and(|m| m.alpha_cutoff.is_some());
+        let masked = (0..self.scene.triangles.len()).map(is_masked).collect();
+        Self { masked, ..self }
     }
 
     /// The first surface that a camera ray shows: it passes through backs of single-sided surfaces (culling).
     #[must_use]
     pub fn camera_hit(&self, origin: Vec3, direction: Vec3) -> Option<Hit> {
-        let shows = |hit: &Hit| match self.sides(hit.triangle) {
-            Sides::None => false,
-            Sides::Front => hit.front,
-            Sides::Both => true,
-        };
+        let shows = |hit: &Hit| self.is_lit_side(hit) && self.is_opaque(hit);
         self.bvh.hit_where(origin, direction, f32::INFINITY, shows)
     }
 
@@ -76,7 +87,11 @@ impl<'a> TraceScene<'a> {
     /// True if the side on which `hit` lies reflects and emits.
     #[must_use]
     pub fn is_lit_side(&self, hit: &Hit) -> bool {
-        hit.front || self.sides(hit.triangle) == Sides::Both
+        match self.sides(hit.triangle) {
+            Sides::None => false,
+            Sides::Front => hit.front,
+            Sides::Both => true,
+        }
     }
 
     /// The surface at a hit, on the side that the ray meets. `footprint` is the area over which textures are averaged,
@@ -137,7 +152,13 @@ impl<'a> TraceScene<'a> {
     }
 
     fn is_opaque(&self, hit: &Hit) -> bool {
-        self.sides(hit.triangle) != Sides::None
+        self.sides(hit.triangle) != Sides::None && !self.is_hole(hit)
+    }
+
+    fn is_hole(&self, hit: &Hit) -> bool {
+        let triangle = hit.triangle as usize;
+        let masked = self.masked.get(triangle).copied().unwrap_or(false);
+        masked && self.scene.albedo_at(triangle, hit.barycentric, 0.0).coverage < SOLID
     }
 
     fn sides(&self, triangle: u32) -> Sides {

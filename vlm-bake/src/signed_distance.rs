@@ -38,7 +38,8 @@ impl<'a> IslandDistance<'a> {
     #[must_use]
     pub fn new(patches: &'a Patches) -> Self {
         let island = |t: usize| patches.region(t).island;
-        let islands = GroupedBvh::new(&patches.positions, &patches.triangles, island, patches.islands as usize);
+        let islands =
+            GroupedBvh::new(&patches.positions, &patches.triangles, island, patches.islands as usize);
         let normals: Vec<DVec3> =
             (0..patches.triangles.len()).map(|t| cross_of(patches.corners(t)).normalize_or_zero()).collect();
         let vertex_normals = vertex_normals(patches, &normals);

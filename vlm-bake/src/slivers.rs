@@ -19,7 +19,8 @@ const FLIP_COSINE: f64 = 0.95;
 /// Flips what can be flipped, drops what is still too thin.
 pub fn remove_slivers(mesh: &mut LightMesh) {
     flip_caps(mesh);
-    let keep: Vec<bool> = (0..mesh.faces.len()).map(|f| aspect_ratio(mesh.corners(f)) <= TARGET_ASPECT).collect();
+    let keep: Vec<bool> =
+        (0..mesh.faces.len()).map(|f| aspect_ratio(mesh.corners(f)) <= TARGET_ASPECT).collect();
     let mut kept = keep.iter();
     mesh.faces.retain(|_| kept.next().copied().unwrap_or(true));
 }
@@ -49,7 +50,8 @@ fn flip_caps(mesh: &mut LightMesh) {
 fn flip(mesh: &LightMesh, a: &EdgeUse, b: &EdgeUse) -> Option<[Face; 2]> {
     let (face_a, face_b) = (mesh.faces[a.triangle as usize], mesh.faces[b.triangle as usize]);
     let corner = |face: &Face, side: u8, i: usize| face.vertices[(usize::from(side) + i) % 3];
-    let (from, to, apex_a) = (corner(&face_a, a.side, 0), corner(&face_a, a.side, 1), corner(&face_a, a.side, 2));
+    let (from, to, apex_a) =
+        (corner(&face_a, a.side, 0), corner(&face_a, a.side, 1), corner(&face_a, a.side, 2));
     let apex_b = corner(&face_b, b.side, 2);
     let opposed = corner(&face_b, b.side, 0) == to;
     if !opposed || apex_a == apex_b || face_a.region != face_b.region || face_a.back != face_b.back {

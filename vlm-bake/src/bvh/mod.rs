@@ -1,6 +1,7 @@
 //! Ray and nearest-point queries on a set of triangles.
 //!
-//! The tree is obvhs' binary BVH (PLOC: Meister and Bittner 2018; reinsertion: Meister and Bittner 2018).
+//! The tree is obvhs' binary BVH: parallel locally-ordered clustering (Meister and Bittner 2018), improved by parallel
+//! reinsertion (Meister and Bittner 2018).
 //! Answers do not depend on the tree's shape, and so not on the number of threads that built it: ties go to the
 //! triangle of the lowest index, and the boxes are padded so that rounding never culls a hit.
 
@@ -173,7 +174,7 @@ impl Bvh {
             let mut next = Some((0_u32, squared_distance_to_box(p, root.aabb())));
             while let Some((index, box_distance)) = next {
                 next = None;
-                // `>` keeps ties in the search; a NaN point prunes everything.
+                // Ties stay in the search; a NaN point prunes everything.
                 if box_distance <= limit {
                     let node = &self.tree.nodes[index as usize];
                     if node.is_leaf() {

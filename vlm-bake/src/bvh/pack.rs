@@ -52,7 +52,7 @@ impl TrianglePack {
     #[inline]
     pub fn intersect(&self, ray: &ShearedRay) -> PackHit {
         let [a, b, c] = &self.corners;
-        let (a, b, c) = (ray.to_sheared(a), ray.to_sheared(b), ray.to_sheared(c));
+        let (a, b, c) = (ray.shear_corner(a), ray.shear_corner(b), ray.shear_corner(c));
         let u = c.x * b.y - c.y * b.x;
         let v = a.x * c.y - a.y * c.x;
         let w = b.x * a.y - b.y * a.x;
@@ -87,7 +87,7 @@ impl ShearedRay {
     }
 
     #[inline]
-    fn to_sheared(&self, corner: &[Vec4; 3]) -> Sheared {
+    fn shear_corner(&self, corner: &[Vec4; 3]) -> Sheared {
         let [x, y, z] = self.axes;
         let (x, y, z) = (corner[x] - self.origin[x], corner[y] - self.origin[y], corner[z] - self.origin[z]);
         let [shear_x, shear_y, shear_z] = self.shear;

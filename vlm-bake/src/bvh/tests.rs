@@ -77,7 +77,7 @@ fn closest_agrees_with_testing_every_triangle() {
     let bvh = Bvh::new(&positions, &triangles);
     let corners: Vec<_> = triangles.iter().map(|t| t.map(|i| Vec3A::from(positions[i as usize]))).collect();
     let mut state = 3;
-    let even = |i: u32| i % 2 == 0;
+    let even = |i: u32| i.is_multiple_of(2);
     for _ in 0..500 {
         let p = point(&mut state) * 2.0 - 0.5;
         let expected = (corners.iter().zip(0_u32..))

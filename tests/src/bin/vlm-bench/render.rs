@@ -152,7 +152,7 @@ fn render_by(
         MethodArg::Reference => Method::Reference,
     };
     let (width, height) = args.size;
-    let options = RenderOptions { width, height, method, samples: args.spp };
+    let options = RenderOptions { width, height, method, samples: args.spp, alpha_masks: false };
     Ok((render(scene, asset, camera, &options, &Silent)?, None))
 }
 

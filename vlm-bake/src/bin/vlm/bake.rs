@@ -49,11 +49,11 @@ pub struct BakeArgs {
 /// Presets by name.
 #[derive(Clone, Copy, ValueEnum)]
 enum PresetArg {
-    /// A quick look: 2 % of the triangles as lights (120 to 4,000), 2 samples each
+    /// A quick look: 5 % of the triangles as lights (120 to 4,000), 2 samples each
     Draft,
-    /// For shipping: 10 % of the triangles (460 to 16,000), 4 samples each
+    /// For shipping: 20 % of the triangles (460 to 16,000), 4 samples each
     Game,
-    /// For stills: 40 % of the triangles (1,840 to 64,000), 16 samples each
+    /// For stills: 80 % of the triangles (1,840 to 64,000), 16 samples each
     Quality,
 }
 
@@ -103,9 +103,12 @@ pub fn run(args: &BakeArgs) -> Result<(), CliError> {
 }
 
 fn load_scene(file: &GltfFile, bars: &Bars) -> Result<Scene, CliError> {
-    let textures = file.document().textures().len() as u64;
-    bars.begin("textures", textures);
-    let on_texture = |_done: usize, _total: usize| bars.advance(1);
+    let on_texture = |done: usize, total: usize| {
+        if done == 1 {
+            bars.begin("textures", total as u64);
+        }
+        bars.advance(1);
+    };
     Ok(load(file, &LoadOptions { on_texture: Some(&on_texture), ..LoadOptions::default() })?)
 }
 
@@ -171,8 +174,7 @@ fn summarize(args: &BakeArgs, report: &Report, preview: Option<&str>) -> Result<
         metres(report.offset.mean_m),
         metres(report.clearance.required_m)
     ));
-    // Adding 0 turns the -0 of an empty sum into 0.
-    let share = 0.0 + 100.0 * report.area.tagged_m2 / report.area.lights_m2.max(f64::MIN_POSITIVE);
+    let share = 100.0 * report.area.tagged_m2.max(0.0) / report.area.lights_m2.max(f64::MIN_POSITIVE);
     lines.push(format!("tags      {} ({share:.1} % of the lights' area)", report.tags.len()));
     lines.push(format!(
         "grid      {} of {} cells stored, {} entries, {:.1} kB",

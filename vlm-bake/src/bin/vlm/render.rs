@@ -31,6 +31,9 @@ pub struct RenderArgs {
     /// Directions per pixel of the method `reference`; four times as many halve the noise
     #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..))]
     spp: u32,
+    /// Cut the holes of alpha masks; without this they count as solid
+    #[arg(long)]
+    alpha_masks: bool,
     /// Write the picture, tone mapped
     #[arg(long, value_name = "IMG.png")]
     out: Option<PathBuf>,
@@ -95,7 +98,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let asset = if needs_lights { read_vlm(&file)? } else { None };
     let camera = scene.camera(args.camera.as_deref())?;
     let (width, height) = args.size;
-    let options = RenderOptions { width, height, method, samples: args.spp };
+    let options = RenderOptions { width, height, method, samples: args.spp, alpha_masks: args.alpha_masks };
 
     let rendering = render(&scene, asset.as_ref(), &camera, &options, &bars)?;
     let exposure = write_files(args, &rendering)?;
