@@ -1,7 +1,6 @@
 //! `vlm bake`: a glTF in, the same glTF with its Virtual Light Meshes out.
 
 use std::fs;
-use std::io::{Write, stdout};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -12,10 +11,11 @@ use vlm_bake::progress::Progress;
 use vlm_bake::render::{Method, RenderOptions, render};
 use vlm_bake::report::Report;
 use vlm_bake::scene::{LoadOptions, Scene, load};
-use vlm_format::{Container, GltfFile, OutputFile, Target, write_atomic, write_vlm};
+use vlm_format::{GltfFile, OutputFile, write_vlm};
 
 use crate::error::CliError;
 use crate::input::{is_pipe, open};
+use crate::output::{check_folder, deliver, print, target};
 use crate::progress::Bars;
 
 /// Size of the preview: small enough to take seconds without a GPU.
@@ -81,7 +81,8 @@ fn positive(text: &str) -> Result<f32, String> {
 pub fn run(args: &BakeArgs) -> Result<(), CliError> {
     let bars = Bars::new();
     let target = target(&args.output)?;
-    check_folders(args)?;
+    let named = [Some(&args.output), args.report.as_ref(), args.preview.as_ref()];
+    named.into_iter().flatten().try_for_each(|path| check_folder(path))?;
 
     bars.begin("read", 1);
     let file = open(&args.input)?;
@@ -98,37 +99,7 @@ pub fn run(args: &BakeArgs) -> Result<(), CliError> {
     }
     let preview = args.preview.as_deref().map(|path| preview(path, &scene, &baked, &bars)).transpose()?;
     drop(bars);
-    summarize(args, &baked.report, preview.as_deref());
-    Ok(())
-}
-
-/// The container that the output's name asks for; a pipe gets a .glb.
-fn target(output: &Path) -> Result<Target, CliError> {
-    if is_pipe(output) {
-        return Ok(Target { container: Container::Glb, file_name: "baked.glb".to_owned() });
-    }
-    Target::from_path(output).map_err(|error| CliError::usage(error.to_string()))
-}
-
-/// The folder of a path, `.` for a bare name.
-fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// Says at once, not after the bake, that a folder to write into does not exist.
-fn check_folders(args: &BakeArgs) -> Result<(), CliError> {
-    let named = [Some(&args.output), args.report.as_ref(), args.preview.as_ref()];
-    for path in named.into_iter().flatten().filter(|path| !is_pipe(path)) {
-        let folder = folder_of(path);
-        if !folder.is_dir() {
-            return Err(CliError::usage(format!(
-                "{}: cannot be written: the folder {} does not exist; create it, or name another",
-                path.display(),
-                folder.display()
-            )));
-        }
-    }
-    Ok(())
+    summarize(args, &baked.report, preview.as_deref())
 }
 
 fn load_scene(file: &GltfFile, bars: &Bars) -> Result<Scene, CliError> {
@@ -155,15 +126,6 @@ fn hash(outputs: &[OutputFile]) -> String {
         hasher.update(&output.bytes);
     }
     hasher.finalize().to_hex().to_string()
-}
-
-fn deliver(output: &Path, outputs: &[OutputFile]) -> Result<(), CliError> {
-    if !is_pipe(output) {
-        return Ok(write_atomic(outputs, folder_of(output))?);
-    }
-    let mut pipe = stdout().lock();
-    let sent = outputs.iter().try_for_each(|o| pipe.write_all(&o.bytes)).and_then(|()| pipe.flush());
-    sent.map_err(|e| CliError::usage(format!("standard output: {e}")))
 }
 
 fn write_report(path: &Path, report: &Report) -> Result<(), CliError> {
@@ -193,7 +155,7 @@ fn preview(path: &Path, scene: &Scene, baked: &Bake, bars: &Bars) -> Result<Stri
 }
 
 /// The closing lines: what was made, in numbers. On stdout, or on stderr where stdout carries the file.
-fn summarize(args: &BakeArgs, report: &Report, preview: Option<&str>) {
+fn summarize(args: &BakeArgs, report: &Report, preview: Option<&str>) -> Result<(), CliError> {
     let mut lines = vec![format!("baked     {}", args.output.display())];
     lines.push(format!(
         "lights    {} of {} asked, for {} visible triangles; decimation error {}",
@@ -224,9 +186,11 @@ fn summarize(args: &BakeArgs, report: &Report, preview: Option<&str>) {
     lines.push(format!("time      {:.2} s", report.seconds.values().sum::<f64>()));
     lines.extend(report.notes.iter().map(|note| format!("note      {note}")));
     lines.extend(preview.filter(|line| !line.is_empty()).map(str::to_owned));
-    for line in lines {
-        if is_pipe(&args.output) { eprintln!("{line}") } else { println!("{line}") }
+    if !is_pipe(&args.output) {
+        return print(&lines);
     }
+    lines.iter().for_each(|line| eprintln!("{line}"));
+    Ok(())
 }
 
 /// A length with a unit that suits it.
