@@ -54,13 +54,22 @@ pub enum BakeError {
          every object is excluded by `extras.vlm`. Give at least one surface an opaque material that is not black"
     )]
     NothingReflects,
+    /// The budget is too small for any light to be left.
+    #[error(
+        "no light is left of the {asked} asked for: the surface falls into pieces too small for them. Ask for more lights"
+    )]
+    NothingLeft {
+        /// The budget.
+        asked: u32,
+    },
 }
 
 /// Bakes the Virtual Light Meshes of a scene. The result depends on the scene and the options alone, not on the number of
 /// threads.
 ///
 /// # Errors
-/// [`BakeError::NothingReflects`] if no surface makes lights and no artist made any.
+/// [`BakeError::NothingReflects`] if no surface makes lights and no artist made any; [`BakeError::NothingLeft`] if the
+/// budget leaves none.
 pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Result<Bake, BakeError> {
     let mut clock = Clock::new(progress);
 
@@ -126,6 +135,9 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     lights.retain(|light| placeable(scene, light));
     let authored_dropped = authored_before - authored_lights(&lights);
     order(&mut lights);
+    if lights.is_empty() {
+        return Err(BakeError::NothingLeft { asked: options.lights });
+    }
     let corners: Vec<[DVec3; 3]> = lights.iter().map(|l| l.corners).collect();
     let grid = grid(scene, &corners, options.cell_size, options.range);
 

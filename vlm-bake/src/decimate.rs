@@ -134,12 +134,15 @@ impl SimplifierInput {
             (shorter, error)
         };
         let (mut indices, mut error) = run(&self.indices, 0, free_error, SimplifyOptions::RegularizeLight);
-        // First within the topology; only a budget that this cannot meet removes whole islands.
-        for options in
-            [SimplifyOptions::RegularizeLight, SimplifyOptions::RegularizeLight | SimplifyOptions::Prune]
-        {
-            if indices.len() > target * 3 {
-                let (shorter, further) = run(&indices, target, f32::MAX, options);
+        if indices.len() > target * 3 {
+            let (shorter, further) = run(&indices, target, f32::MAX, SimplifyOptions::RegularizeLight);
+            (indices, error) = (shorter, error.max(further));
+        }
+        // Only a budget that the topology does not allow removes islands, and only while enough of the surface stays.
+        if indices.len() > target * 3 + target / 8 {
+            let options = SimplifyOptions::RegularizeLight | SimplifyOptions::Prune;
+            let (shorter, further) = run(&indices, target, f32::MAX, options);
+            if 2 * shorter.len() > target * 3 {
                 (indices, error) = (shorter, error.max(further));
             }
         }

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::f32::consts::PI;
 
+use crate::clearance::self_lighting;
 use crate::decimate::LightMesh;
 use crate::patches::Patches;
 use crate::refine::Light;
@@ -114,7 +115,7 @@ fn finish_light(
 }
 
 /// The points of a light with the colours of the surface there, each the mean over the point's share of the area. A light that got
-/// none borrows the point of its face that is nearest to its centre.
+/// none borrows the nearest point of its face that it does not light.
 fn candidates<'a>(sources: &Sources<'a>, number: usize, light: &Light) -> Vec<Candidate<'a>> {
     let coloured = |&p: &u32| {
         let point = &sources.points[p as usize];
@@ -128,7 +129,10 @@ fn candidates<'a>(sources: &Sources<'a>, number: usize, light: &Light) -> Vec<Ca
     }
     let centre = light.corners.iter().sum::<DVec3>() / 3.0;
     let away = |p: &&u32| sources.points[**p as usize].position.distance_squared(centre);
-    let nearest = sources.of_faces.of(light.face as usize).iter().min_by(|a, b| away(a).total_cmp(&away(b)));
+    let dark =
+        |p: &&u32| self_lighting(&light.corners, light.normal(), &sources.points[**p as usize], 0.0) <= 0.0;
+    let of_face = sources.of_faces.of(light.face as usize).iter().filter(dark);
+    let nearest = of_face.min_by(|a, b| away(a).total_cmp(&away(b)));
     nearest.map(coloured).into_iter().collect()
 }
 
