@@ -1,15 +1,12 @@
 // Validates glTF files with the Khronos validator and prints one JSON report for all of them:
-//   node validate.mjs FOLDER_WITH_NODE_MODULES FILE...
+//   node validate.mjs FILE...
 // [{ "file", "errors", "warnings", "messages": [{ "code", "severity", "pointer", "message" }] }]
 import { readFile } from "node:fs/promises";
-import { createRequire } from "node:module";
 import path from "node:path";
-
-const [modules, ...files] = process.argv.slice(2);
-const { validateBytes } = createRequire(path.join(path.resolve(modules), "package.json"))("gltf-validator");
+import validator from "gltf-validator";
 
 async function validate(file) {
-  const report = await validateBytes(new Uint8Array(await readFile(file)), {
+  const report = await validator.validateBytes(new Uint8Array(await readFile(file)), {
     uri: path.basename(file),
     maxIssues: 0,
     writeTimestamp: false,
@@ -20,4 +17,4 @@ async function validate(file) {
   return { file, errors: numErrors, warnings: numWarnings, messages };
 }
 
-console.log(JSON.stringify(await Promise.all(files.map(validate))));
+console.log(JSON.stringify(await Promise.all(process.argv.slice(2).map(validate))));

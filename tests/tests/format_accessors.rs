@@ -1,5 +1,8 @@
 //! Accessors decode to the values that the specification gives for their bytes.
 
+#![allow(clippy::unwrap_used, reason = "what cannot be unwrapped fails the test")]
+#![allow(clippy::needless_pass_by_value, reason = "literals read better without borrows")]
+
 use glam::{Mat4, Vec2, Vec3, Vec4};
 use serde_json::{Value, json};
 use vlm_format::{Code, Error, GltfFile};

@@ -1,5 +1,7 @@
 //! Damaged files: whatever a byte, a number or a cut does to a file, it opens or is refused, and nothing panics.
 
+#![allow(clippy::unwrap_used, reason = "what cannot be unwrapped fails the test")]
+
 use gltf::camera::Projection;
 use gltf::khr_lights_punctual::Kind;
 use serde_json::{Value, json};
@@ -94,7 +96,7 @@ fn places(value: &Value, pointer: &str, found: &mut Vec<String>) {
             list.iter().enumerate().for_each(|(i, item)| places(item, &format!("{pointer}/{i}"), found));
         }
         Value::Object(map) => {
-            map.iter().for_each(|(key, item)| places(item, &format!("{pointer}/{key}"), found))
+            map.iter().for_each(|(key, item)| places(item, &format!("{pointer}/{key}"), found));
         }
         _ => {}
     }

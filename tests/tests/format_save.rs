@@ -1,5 +1,7 @@
 //! Writing to disk: all or nothing, and a clear word when it cannot be.
 
+#![allow(clippy::unwrap_used, reason = "what cannot be unwrapped fails the test")]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,7 @@
 //! What is written conforms to the JSON Schemas of the extension.
 
+#![allow(clippy::unwrap_used, reason = "what cannot be unwrapped fails the test")]
+
 use std::fs;
 use std::path::Path;
 

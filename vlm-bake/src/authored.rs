@@ -11,7 +11,7 @@ use crate::bvh::Bvh;
 use crate::clearance::self_lighting;
 use crate::options::BakeOptions;
 use crate::samples::{BakedLight, WorldSample};
-use crate::scene::{AuthoredMesh, AuthoredMode, Scene};
+use crate::scene::{AuthoredMesh, AuthoredMode, Scene, Volume};
 use crate::surface::{SurfacePoint, spread_over};
 use crate::tag::Tags;
 use crate::topology::{barycentric, cross_of};
@@ -72,45 +72,13 @@ pub fn merge(
     check
 }
 
-/// Removes the derived lights whose centres lie inside an authored mesh: by the parity of crossings where the mesh is closed,
-/// within its bounding box where it is open.
+/// Removes the derived lights whose centres lie inside an authored mesh.
 fn subtract(mesh: &AuthoredMesh, lights: &mut Vec<BakedLight>) {
-    let bvh = Bvh::new(&mesh.positions, &mesh.triangles);
-    let low = mesh.positions.iter().copied().fold(Vec3::INFINITY, Vec3::min);
-    let high = mesh.positions.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
-    let closed = is_closed(mesh);
+    let volume = Volume::of(mesh);
     lights.retain(|light| {
         let centre = (light.corners.iter().sum::<DVec3>() / 3.0).as_vec3();
-        let boxed = centre.cmpge(low).all() && centre.cmple(high).all();
-        light.authored || !boxed || (closed && !inside(&bvh, centre))
+        light.authored || !volume.contains(centre)
     });
-}
-
-/// True if every edge is used by two triangles, vertices taken by position.
-fn is_closed(mesh: &AuthoredMesh) -> bool {
-    let mut order: Vec<u32> = (0..mesh.positions.len() as u32).collect();
-    let bits = |v: u32| mesh.positions[v as usize].to_array().map(f32::to_bits);
-    order.sort_by_key(|&v| bits(v));
-    let mut welded = vec![0; mesh.positions.len()];
-    for same in order.chunk_by(|&a, &b| bits(a) == bits(b)) {
-        for &v in same {
-            welded[v as usize] = same[0];
-        }
-    }
-    let triangles: Vec<[u32; 3]> = mesh.triangles.iter().map(|t| t.map(|v| welded[v as usize])).collect();
-    crate::topology::edges(&crate::topology::edge_uses(&triangles)).all(|uses| uses.len() % 2 == 0)
-}
-
-/// True if a ray crosses the mesh an odd number of times.
-fn inside(bvh: &Bvh, p: Vec3) -> bool {
-    // Along no axis and no diagonal, where modelled edges lie.
-    let direction = Vec3::new(0.267_261, 0.534_522, 0.801_784);
-    let mut crossings = std::collections::BTreeSet::new();
-    while bvh
-        .hit_where(p, direction, f32::INFINITY, |hit| !crossings.contains(&hit.triangle))
-        .is_some_and(|hit| crossings.insert(hit.triangle))
-    {}
-    crossings.len() % 2 == 1
 }
 
 /// The visible surface as authored lights search it.

@@ -14,21 +14,23 @@ use crate::offset::offset;
 use crate::options::BakeOptions;
 use crate::patches::{Patches, patches};
 use crate::progress::Progress;
-use crate::refine::refine;
+use crate::refine::{Light, refine};
 use crate::report::{AreaReport, DecimationReport, GridReport, OffsetReport, Report};
 use crate::samples::{BakedLight, Sources, samples};
 use crate::scene::Scene;
 use crate::signed_distance::IslandDistance;
-use crate::surface::{Standing, SurfacePoint, spread_points, stand_ins};
+use crate::slivers::MAX_ASPECT;
+use crate::surface::{Standing, SurfacePoint, hand_on, spread_points, stand_ins};
 use crate::tag::{Tags, tag};
-use crate::verify::{ClearanceReport, Violation, verify};
+use crate::topology::aspect_ratio;
+use crate::verify::{ClearanceReport, Evidence, Violation, sink, verify};
 use crate::write::{assemble, order, placeable};
 
 /// A face stands for surface at most this share of the scene's extent away, on top of four times the decimation's error.
 const REACH_SHARE: f64 = 0.02;
 
-/// Lights sink by at most this many times the clearance and the decimation's error together. The error is a root mean
-/// square: single places are off by a few times as much.
+/// Lights sink by at most this many times the clearance and the mean distance between faces and their surface together. Higher values
+/// hide more lights behind bumpy surface instead of tagging them, and put all of them deeper there, where they fit their surface less.
 const DEEPEST: f64 = 4.0;
 
 /// The least number of surface points of a bake: small budgets are tested as finely as medium ones.
@@ -76,30 +78,43 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let clearance = required_clearance(scene.bounds().unwrap_or_default());
     let points = spread_points(&patches, point_count(options));
     let stand_ins = stand_ins(&points, &patches, &mesh, reach(scene, &decimation));
-    let standing = Standing::new(&stand_ins, mesh.faces.len());
+    let of_faces = Standing::new(&stand_ins, mesh.faces.len());
     let distance = IslandDistance::new(&patches);
-    let deepest = DEEPEST * (clearance + decimation.error_m);
-    let moved = offset(&mut mesh, &patches, &points, &standing, &distance, clearance, deepest);
-
-    clock.stage("verify");
-    let violations = verify(&mesh, &patches, &points, &standing, &distance, clearance);
-
-    clock.stage("tag");
-    let mut tags = tag(scene, &patches, &mesh, &violations);
+    let deepest = DEEPEST * (clearance + mean_distance(&points, &stand_ins, &mesh));
+    let moved = offset(&mut mesh, &patches, &points, &of_faces, &distance, clearance, deepest);
 
     clock.stage("refine");
-    let density = densities(scene, &patches, &mesh, &standing);
-    let authored_count = authored::count(scene);
-    let lights = refine(&mesh, &density, (options.lights as usize).saturating_sub(authored_count));
+    let density = densities(scene, &patches, &mesh, &of_faces);
+    let mut lights =
+        refine(&mesh, &density, (options.lights as usize).saturating_sub(authored::count(scene)));
+    let of_lights = Standing::new(&hand_on(&points, &of_faces, &lights), lights.len());
+
+    clock.stage("verify");
+    let evidence = Evidence {
+        patches: &patches,
+        mesh: &mesh,
+        points: &points,
+        standing: &of_lights,
+        distance: &distance,
+        clearance,
+    };
+    sink(&mut lights, &evidence, deepest);
+    let violations = verify(&lights, &evidence);
+
+    clock.stage("tag");
+    let mut tags = tag(scene, &patches, &mesh, &lights, &violations);
+    let clearance_report = remaining(scene, &evidence, &lights, &violations, &tags);
 
     clock.stage("samples");
+    let light_tags = tags.lights.clone();
     let sources = Sources {
         scene,
         patches: &patches,
         mesh: &mesh,
-        tags: &tags.faces,
+        tags: &light_tags,
         points: &points,
-        standing: &standing,
+        of_faces: &of_faces,
+        of_lights: &of_lights,
     };
     let mut lights = samples(&sources, &lights, options.samples);
 
@@ -107,7 +122,9 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let authored_check = authored::merge(scene, &mut lights, &mut tags, options, clearance);
 
     clock.stage("grid");
+    let authored_before = authored_lights(&lights);
     lights.retain(|light| placeable(scene, light));
+    let authored_dropped = authored_before - authored_lights(&lights);
     order(&mut lights);
     let corners: Vec<[DVec3; 3]> = lights.iter().map(|l| l.corners).collect();
     let grid = grid(scene, &corners, options.cell_size, options.range);
@@ -121,17 +138,17 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
         clearance: ClearanceReport {
             samples: points.len() as u64 + authored_check.samples,
             required_m: clearance,
-            ..remaining(scene, &patches, &mesh, &violations, &tags)
+            ..clearance_report
         },
         tags: tags.report(),
         area: area_report(&points, &stand_ins, &lights),
         grid: grid_report(grid.as_ref()),
-        notes: scene.notes.clone(),
+        notes: notes(scene, authored_dropped),
         ..Report::default()
     };
     let asset = assemble(scene, &lights, &tags, grid, options);
     report.lights = asset.triangles.len();
-    report.authored_lights = lights.iter().filter(|l| l.authored).count();
+    report.authored_lights = authored_lights(&lights);
     report.samples = asset.samples.len();
     report.missed_because = why_missed(&report, options);
     report.seconds = clock.finish();
@@ -141,21 +158,37 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
 /// The violations that no tag mends: a receiver ignores a light of its own tag.
 fn remaining(
     scene: &Scene,
-    patches: &Patches,
-    mesh: &LightMesh,
+    evidence: &Evidence,
+    lights: &[Light],
     violations: &[Violation],
     tags: &Tags,
 ) -> ClearanceReport {
     let mut report = ClearanceReport::default();
     for violation in violations {
-        let primitive = patches.regions[mesh.faces[violation.face as usize].region as usize].primitive;
-        let tag = tags.faces[violation.face as usize];
+        let face = lights[violation.light as usize].face;
+        let primitive =
+            evidence.patches.regions[evidence.mesh.faces[face as usize].region as usize].primitive;
+        let tag = tags.lights[violation.light as usize];
         if tag == 0 || tag != tags.of_primitive(scene, primitive) {
             report.violations += u64::from(violation.points) + u64::from(violation.pokes_out);
             report.worst_m = report.worst_m.max(violation.depth);
         }
     }
     report
+}
+
+fn authored_lights(lights: &[BakedLight]) -> usize {
+    lights.iter().filter(|light| light.authored).count()
+}
+
+fn notes(scene: &Scene, authored_dropped: usize) -> Vec<String> {
+    let mut notes = scene.notes.clone();
+    if authored_dropped > 0 {
+        notes.push(format!(
+            "{authored_dropped} authored lights left out: longer than {MAX_ASPECT} times their height; divide these triangles"
+        ));
+    }
+    notes
 }
 
 fn point_count(options: &BakeOptions) -> usize {
@@ -168,12 +201,24 @@ fn reach(scene: &Scene, decimation: &Decimation) -> f64 {
     REACH_SHARE * extent + 4.0 * decimation.error_m
 }
 
-/// The artist's density per face; 0 where a face stands for nothing.
+/// The mean distance of points from the planes of the faces that stand for them, metres.
+fn mean_distance(points: &[SurfacePoint], stand_ins: &[Option<u32>], mesh: &LightMesh) -> f64 {
+    let distance = |(point, face): (&SurfacePoint, &Option<u32>)| {
+        let face = (*face)? as usize;
+        Some((point.position - mesh.corners(face)[0]).dot(mesh.normal(face)).abs())
+    };
+    let (sum, count) =
+        points.iter().zip(stand_ins).filter_map(distance).fold((0.0, 0.0), |(sum, n), d| (sum + d, n + 1.0));
+    if count > 0.0 { sum / count } else { 0.0 }
+}
+
+/// The artist's density per face; 0 where a face stands for nothing, or where the offset made it too thin to be a light.
 fn densities(scene: &Scene, patches: &Patches, mesh: &LightMesh, standing: &Standing) -> Vec<f64> {
     let density = |(f, face): (usize, &crate::decimate::Face)| {
         let primitive = &scene.primitives[patches.regions[face.region as usize].primitive as usize];
         let asked = f64::from(scene.objects[primitive.object as usize].steering.density);
-        if standing.of(f).is_empty() { 0.0 } else { asked }
+        let too_thin = aspect_ratio(mesh.corners(f)) > MAX_ASPECT;
+        if standing.of(f).is_empty() || too_thin { 0.0 } else { asked }
     };
     mesh.faces.iter().enumerate().map(density).collect()
 }

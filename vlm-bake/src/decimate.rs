@@ -91,8 +91,11 @@ struct SimplifierInput {
 
 impl SimplifierInput {
     fn new(patches: &Patches) -> Self {
-        // Relative to the first vertex, so that f32 keeps its digits in scenes far from the origin.
+        // Relative to the first vertex, so that f32 keeps its digits in scenes far from the origin; and each object at a
+        // distance of its own, since the simplifier takes equal positions for one vertex, and objects that touch (kits of
+        // tiles) would lock each other's borders.
         let origin = patches.positions.first().copied().unwrap_or_default();
+        let extent = patches.positions.iter().fold(0.0f64, |e, p| e.max((p - origin).abs().max_element()));
         let mut input = Self {
             positions: Vec::new(),
             indices: Vec::with_capacity(patches.triangles.len() * 3),
@@ -103,7 +106,9 @@ impl SimplifierInput {
         for (corners, &region) in patches.triangles.iter().zip(&patches.triangle_region) {
             for &welded in corners {
                 let vertex = *vertex_of.entry((welded, region)).or_insert_with(|| {
-                    input.positions.push((patches.positions[welded as usize] - origin).as_vec3().to_array());
+                    let place = patches.positions[welded as usize] - origin
+                        + apart(patches.vertex_object[welded as usize], extent);
+                    input.positions.push(place.as_vec3().to_array());
                     input.vertex_welded.push(welded);
                     input.vertex_region.push(region);
                     input.positions.len() as u32 - 1
@@ -158,6 +163,12 @@ impl SimplifierInput {
             .collect();
         LightMesh { positions: patches.positions.clone(), faces }
     }
+}
+
+/// A shift for an object, different for each and unlikely to make places of two objects meet, at most as long as the scene.
+fn apart(object: u32, extent: f64) -> DVec3 {
+    DVec3::new(0.754_877_666, 0.569_840_290, 0.430_159_709)
+        .map(|step| (f64::from(object) * step).fract() * extent)
 }
 
 /// Gives two-sided surfaces a second sheet of faces with vertices of its own, turned round.

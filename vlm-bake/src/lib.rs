@@ -1,7 +1,7 @@
 //! Bakes Virtual Light Meshes from glTF, and renders them on the CPU.
 //!
 //! Stages of the bake, in the order in which data flows:
-//! `scene -> patches -> decimate -> offset -> verify -> tag -> refine -> samples -> authored -> grid -> write`.
+//! `scene -> patches -> decimate -> offset -> refine -> verify -> tag -> samples -> authored -> grid -> write`.
 //! For pictures on the CPU: `scene, bvh -> camera -> shade -> gbuffer -> reference | render -> picture`.
 
 pub mod options;
@@ -18,9 +18,9 @@ pub mod surface;
 pub mod clearance;
 pub mod signed_distance;
 pub mod offset;
+pub mod refine;
 pub mod verify;
 pub mod tag;
-pub mod refine;
 pub mod samples;
 pub mod authored;
 pub mod grid;

@@ -1,18 +1,17 @@
-//! Stage 4: moves each vertex inward, by the least displacement that hides its faces behind the surface they stand for.
+//! Stage 4: moves each vertex inward, by the least displacement that puts its faces behind the surface they stand for.
 //!
-//! A face hides from a point `x` with normal `n` when all of it lies below the horizon of `x`. Pushed along its own normal `N`
-//! by `d`, a corner's height above that horizon changes from `n . (v - x)` to `n . (v - x) - d n . N`, so the face needs
+//! Decimating a convex part already falls inside, a concave part pokes out in front. With `N` the face's normal, a point `x` for
+//! which it stands lies at height `N . (x - v)` over the face, so the face must sink by
 //! ```text
-//! d >= (max_v n . (v - x) + clearance) / (n . N)      for each of its points x
+//! depth = max_x N . (v - x) + clearance
 //! ```
-//! Its depth is the greatest of these. A vertex belongs to several faces; it moves by the shortest `delta` with
-//! `N_f . delta <= -depth_f` for each: a quadratic program in three unknowns, solved by Hildreth's row action (1957).
-//! At the corner of a room that is the mitre of its three walls; lights stay joined and cover the corner.
+//! A vertex belongs to several faces; it moves by the shortest `delta` with `N_f . delta <= -depth_f` for each: a quadratic
+//! program in three unknowns, solved by Hildreth's row action (1957). At the corner of a room that is the mitre of its
+//! three walls; lights stay joined and cover the corner.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::clearance::{rise, self_lighting};
 use crate::decimate::LightMesh;
 use crate::patches::Patches;
 use crate::signed_distance::IslandDistance;
@@ -25,8 +24,8 @@ const MARGIN: f64 = 1.25;
 /// angles joined, and push their lights out of thin objects; lower values leave such edges to be mended one face at a time.
 const MITRE_LIMIT: f64 = 4.0;
 
-/// Rounds of moving and looking; each deepens the faces that still light their own surface.
-const ROUNDS: usize = 6;
+/// Rounds of moving and looking; each deepens the faces that still lie in front of their surface.
+const ROUNDS: usize = 3;
 
 /// What `offset` did.
 #[derive(Clone, Debug, Default)]
@@ -50,55 +49,27 @@ pub fn offset(
     let rest = mesh.positions.clone();
     let normals: Vec<DVec3> = (0..mesh.faces.len()).map(|f| mesh.normal(f)).collect();
     let incident = incident_faces(mesh, patches);
-    let needed = |mesh: &LightMesh, f: usize| {
-        needed_depth(
-            &mesh.corners(f),
-            normals[f],
-            standing.of(f).iter().map(|&p| &points[p as usize]),
-            target,
-        )
+    let lack = |mesh: &LightMesh, f: usize| {
+        let own = standing.of(f).iter().map(|&p| points[p as usize].position);
+        let face = mesh.positions[mesh.faces[f].vertices[0] as usize];
+        // A point deeper than that lies in a recess that decimation bridged: behind the light, and so unlit by it.
+        own.map(|x| (face - x).dot(normals[f]) + target).filter(|&lack| lack <= deepest).fold(0.0, f64::max)
     };
-    // A face that would have to sink deeper than decimation can explain stands for something it does not resemble: it
-    // stays near the surface, fails the check, and is tagged.
-    let bounded = |depth: f64| if depth > deepest { target } else { depth.max(target) };
     let mut depth: Vec<f64> =
-        (0..mesh.faces.len()).into_par_iter().map(|f| bounded(needed(mesh, f))).collect();
+        (0..mesh.faces.len()).into_par_iter().map(|f| lack(mesh, f).max(target)).collect();
     for _ in 0..ROUNDS {
         displace(mesh, &rest, &normals, &depth, &incident);
         pull_inside(mesh, patches, &incident, distance, target);
-        let failing: Vec<usize> = (0..mesh.faces.len())
-            .into_par_iter()
-            .filter(|&f| !patches.regions[mesh.faces[f].region as usize].two_sided)
-            .filter(|&f| {
-                let light = mesh.corners(f);
-                let own = standing.of(f).iter().map(|&p| &points[p as usize]);
-                own.into_iter().any(|p| self_lighting(&light, mesh.normal(f), p, clearance) > 0.0)
-            })
-            .collect();
-        if failing.is_empty() {
+        let lacking: Vec<f64> = (0..mesh.faces.len()).into_par_iter().map(|f| lack(mesh, f)).collect();
+        if lacking.iter().all(|&lack| lack < target - clearance) {
             break;
         }
-        for f in failing {
-            depth[f] = bounded(depth[f] + needed(mesh, f).max(0.25 * target));
+        for (depth, lack) in depth.iter_mut().zip(lacking) {
+            *depth = (*depth + lack).min(deepest);
         }
     }
     let vertex_moved = mesh.positions.iter().zip(&rest).map(|(moved, at)| moved.distance(*at)).collect();
     Offset { vertex_moved }
-}
-
-/// How much deeper a face must sink to hide from its points, 0 if it need not. Points that look away from it by more than 80
-/// degrees would need a boundless depth; `verify` judges them.
-fn needed_depth<'a>(
-    light: &[DVec3; 3],
-    normal: DVec3,
-    points: impl Iterator<Item = &'a SurfacePoint>,
-    clearance: f64,
-) -> f64 {
-    const LEAST_COSINE: f64 = 0.17;
-    points
-        .filter(|p| p.normal.dot(normal) > LEAST_COSINE)
-        .map(|p| (rise(light, p) + clearance) / p.normal.dot(normal))
-        .fold(0.0, f64::max)
 }
 
 /// The faces that constrain each vertex: those of one-sided surfaces.

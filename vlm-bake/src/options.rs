@@ -59,9 +59,9 @@ impl Preset {
     #[must_use]
     pub fn lights(self, visible_triangles: usize) -> u32 {
         let (share, least, most) = match self {
-            Self::Draft => (0.02, 120.0, 4_000.0),
-            Self::Game => (0.10, 460.0, 16_000.0),
-            Self::Quality => (0.40, 1_840.0, 64_000.0),
+            Self::Draft => (0.05, 120.0, 4_000.0),
+            Self::Game => (0.20, 460.0, 16_000.0),
+            Self::Quality => (0.80, 1_840.0, 64_000.0),
         };
         (visible_triangles as f64 * share).clamp(least, most) as u32
     }

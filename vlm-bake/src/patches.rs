@@ -28,6 +28,8 @@ const BLACK: f32 = 1e-3;
 pub struct Patches {
     /// World-space vertices, each once per object.
     pub positions: Vec<DVec3>,
+    /// Index into [`Scene::objects`] for each vertex.
+    pub vertex_object: Vec<u32>,
     /// Counter-clockwise seen from the front. A two-sided surface is here once.
     pub triangles: Vec<[u32; 3]>,
     /// The scene's triangle.
@@ -107,6 +109,7 @@ fn weld(scene: &Scene, surfaces: &[Surface]) -> Patches {
             let p = scene.positions[v as usize] + Vec3::ZERO; // -0 + 0 = 0: both zeros are one place
             *vertex_of.entry((primitive.object, p.to_array().map(f32::to_bits))).or_insert_with(|| {
                 patches.positions.push(p.as_dvec3());
+                patches.vertex_object.push(primitive.object);
                 patches.positions.len() as u32 - 1
             })
         });

@@ -1,4 +1,4 @@
-//! Stage 8: divides large faces until the budget of lights is spent.
+//! Stage 5: divides large faces until the budget of lights is spent.
 //!
 //! A light has one radiosity, so a large one blurs the light and shadow that falls on its surface. It is cut in half across its
 //! longest edge, which never makes the least angle smaller than half of what it was (Rosenberg and Stenger, "A lower bound on the angles of
@@ -9,40 +9,39 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use glam::DVec3;
-use rustc_hash::FxHashMap;
 
 use crate::decimate::LightMesh;
 use crate::topology::cross_of;
 
-/// The final lights, in world space.
-#[derive(Clone, Debug, Default)]
-pub struct Lights {
-    /// Vertices in metres.
-    pub positions: Vec<DVec3>,
-    /// The lights, in the order of their faces.
-    pub lights: Vec<Light>,
-}
-
 /// One virtual light before it has a radiosity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
-    /// Indices into the positions, counter-clockwise seen from the emitting side.
-    pub vertices: [u32; 3],
+    /// World space, metres, counter-clockwise seen from the emitting side.
+    pub corners: [DVec3; 3],
     /// The face that it is a part of.
     pub face: u32,
 }
 
-impl Lights {
-    /// The corners of a light.
+impl Light {
+    /// Area in square metres.
     #[must_use]
-    pub fn corners(&self, light: usize) -> [DVec3; 3] {
-        self.lights[light].vertices.map(|v| self.positions[v as usize])
+    pub fn area(&self) -> f64 {
+        0.5 * cross_of(self.corners).length()
     }
 
-    /// Area of a light in square metres.
+    /// Unit normal on the emitting side; zero without area.
     #[must_use]
-    pub fn area(&self, light: usize) -> f64 {
-        0.5 * cross_of(self.corners(light)).length()
+    pub fn normal(&self) -> DVec3 {
+        cross_of(self.corners).normalize_or_zero()
+    }
+
+    fn halves(&self) -> [Self; 2] {
+        let p = self.corners;
+        let length = |i: usize| p[i].distance_squared(p[(i + 1) % 3]);
+        let i = (0..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });
+        let [a, b, c] = [p[i], p[(i + 1) % 3], p[(i + 2) % 3]];
+        let middle = (a + b) / 2.0;
+        [Self { corners: [a, middle, c], ..*self }, Self { corners: [middle, b, c], ..*self }]
     }
 }
 
@@ -69,71 +68,28 @@ impl PartialEq for Candidate {
 }
 impl Eq for Candidate {}
 
-/// Cuts faces until there are `budget` lights. `density` is, per face, the factor on the number of lights per area; a face of density
-/// 0 makes no lights.
+/// Cuts faces until there are `budget` lights, in the order of their faces. `density` is, per face, the factor on the number of
+/// lights per area; a face of density 0 makes no lights.
 #[must_use]
-pub fn refine(mesh: &LightMesh, density: &[f64], budget: usize) -> Lights {
-    let mut cutter =
-        Cutter { positions: mesh.positions.clone(), lights: Vec::new(), midpoints: FxHashMap::default() };
-    for (f, face) in mesh.faces.iter().enumerate() {
-        if density[f] > 0.0 {
-            cutter.lights.push(Light { vertices: face.vertices, face: f as u32 });
-        }
-    }
-    let mut queue: BinaryHeap<Candidate> =
-        (0..cutter.lights.len() as u32).map(|light| cutter.candidate(light, density)).collect();
-    while cutter.lights.len() < budget {
-        let Some(next) = queue.pop() else { break };
-        let added = cutter.cut(next.light);
-        queue.push(cutter.candidate(next.light, density));
-        queue.push(cutter.candidate(added, density));
-    }
-    cutter.lights.sort_by_key(|light| light.face);
-    Lights { positions: cutter.positions, lights: cutter.lights }
-}
-
-struct Cutter {
-    positions: Vec<DVec3>,
-    lights: Vec<Light>,
-    midpoints: FxHashMap<[u32; 2], u32>,
-}
-
-impl Cutter {
-    fn corners(&self, light: &Light) -> [DVec3; 3] {
-        light.vertices.map(|v| self.positions[v as usize])
-    }
-
-    /// Longest edge squared, weighed by the density.
-    fn candidate(&self, light: u32, density: &[f64]) -> Candidate {
-        let corners = self.corners(&self.lights[light as usize]);
+pub fn refine(mesh: &LightMesh, density: &[f64], budget: usize) -> Vec<Light> {
+    let whole = |f: usize| Light { corners: mesh.corners(f), face: f as u32 };
+    let mut lights: Vec<Light> = (0..mesh.faces.len()).filter(|&f| density[f] > 0.0).map(whole).collect();
+    let candidate = |lights: &[Light], light: u32| {
+        let Light { corners, face } = &lights[light as usize];
         let longest = (0..3).map(|i| corners[i].distance_squared(corners[(i + 1) % 3])).fold(0.0, f64::max);
-        Candidate { priority: longest * density[self.lights[light as usize].face as usize], light }
+        Candidate { priority: longest * density[*face as usize], light }
+    };
+    let mut queue: BinaryHeap<Candidate> = (0..lights.len() as u32).map(|l| candidate(&lights, l)).collect();
+    while lights.len() < budget {
+        let Some(next) = queue.pop() else { break };
+        let [first, second] = lights[next.light as usize].halves();
+        lights[next.light as usize] = first;
+        lights.push(second);
+        queue.push(candidate(&lights, next.light));
+        queue.push(candidate(&lights, lights.len() as u32 - 1));
     }
-
-    /// Cuts a light in two; returns the number of the new one.
-    fn cut(&mut self, light: u32) -> u32 {
-        let [first, second] = self.halves(&self.lights[light as usize].clone());
-        self.lights[light as usize] = first;
-        self.lights.push(second);
-        self.lights.len() as u32 - 1
-    }
-
-    fn halves(&mut self, light: &Light) -> [Light; 2] {
-        let p = self.corners(light);
-        let length = |i: usize| p[i].distance_squared(p[(i + 1) % 3]);
-        let i = (0..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });
-        let [a, b, c] = [i, (i + 1) % 3, (i + 2) % 3].map(|i| light.vertices[i]);
-        let middle = self.midpoint(a, b);
-        [Light { vertices: [a, middle, c], ..*light }, Light { vertices: [middle, b, c], ..*light }]
-    }
-
-    fn midpoint(&mut self, a: u32, b: u32) -> u32 {
-        let middle = (self.positions[a as usize] + self.positions[b as usize]) / 2.0;
-        *self.midpoints.entry([a.min(b), a.max(b)]).or_insert_with(|| {
-            self.positions.push(middle);
-            self.positions.len() as u32 - 1
-        })
-    }
+    lights.sort_by_key(|light| light.face);
+    lights
 }
 
 #[cfg(test)]
@@ -154,10 +110,10 @@ mod tests {
     fn the_budget_is_met_and_area_kept() {
         let mesh = one_face([dvec3(0.0, 0.0, 0.0), dvec3(2.0, 0.0, 0.0), dvec3(0.0, 1.0, 0.0)]);
         let lights = refine(&mesh, &[1.0], 100);
-        assert_eq!(lights.lights.len(), 100);
-        let area: f64 = (0..100).map(|l| lights.area(l)).sum();
+        assert_eq!(lights.len(), 100);
+        let area: f64 = lights.iter().map(Light::area).sum();
         assert!((area - 1.0).abs() < 1e-12);
-        let worst = (0..100).map(|l| aspect_ratio(lights.corners(l))).fold(0.0, f64::max);
+        let worst = lights.iter().map(|l| aspect_ratio(l.corners)).fold(0.0, f64::max);
         assert!(worst < 6.0, "bisection keeps the shape, but made an aspect ratio of {worst}");
     }
 }

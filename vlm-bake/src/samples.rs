@@ -7,14 +7,14 @@
 //! ```
 //! The ratio of the areas keeps the reflected flux where the light is smaller or larger than its surface.
 
-use glam::{DVec3, Vec3, Vec3A};
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 use std::f32::consts::PI;
 
-use crate::bvh::nearest::closest_point;
 use crate::decimate::LightMesh;
 use crate::patches::Patches;
-use crate::refine::Lights;
+use crate::refine::Light;
 use crate::scene::{Scene, Steering};
 use crate::surface::{Standing, SurfacePoint};
 
@@ -66,84 +66,70 @@ pub struct Sources<'a> {
     pub scene: &'a Scene,
     /// Its patches.
     pub patches: &'a Patches,
-    /// The offset mesh.
+    /// The faces of which the lights are parts.
     pub mesh: &'a LightMesh,
-    /// Tag per face.
+    /// Tag per light.
     pub tags: &'a [u32],
     /// Points on the visible surface.
     pub points: &'a [SurfacePoint],
     /// Which of them each face stands for.
-    pub standing: &'a Standing,
+    pub of_faces: &'a Standing,
+    /// Which of them each light stands for.
+    pub of_lights: &'a Standing,
 }
 
-/// The finished lights, each with at most `count` samples, in the order of `lights`. A face that stands for no point makes no
-/// lights.
+/// The finished lights, each with at most `count` samples. `lights` are in the order of their faces.
 #[must_use]
-pub fn samples(sources: &Sources, lights: &Lights, count: u32) -> Vec<BakedLight> {
-    let numbers: Vec<u32> = (0..lights.lights.len() as u32).collect();
-    let runs: Vec<&[u32]> =
-        numbers.chunk_by(|&a, &b| lights.lights[a as usize].face == lights.lights[b as usize].face).collect();
-    runs.par_iter().flat_map_iter(|run| face_lights(sources, lights, run, count as usize)).collect()
+pub fn samples(sources: &Sources, lights: &[Light], count: u32) -> Vec<BakedLight> {
+    // The ratio of areas is the face's: over one light, the number of points fluctuates too much.
+    let mut face_area: FxHashMap<u32, f64> = FxHashMap::default();
+    for light in lights {
+        *face_area.entry(light.face).or_default() += light.area();
+    }
+    let finish = |(l, light): (usize, &Light)| {
+        let of_face = sources.of_faces.of(light.face as usize);
+        let surface_area: f64 = of_face.iter().map(|&p| sources.points[p as usize].area).sum();
+        let ratio = (surface_area / face_area[&light.face]).min(MOST_AREA_RATIO) as f32;
+        finish_light(sources, l, light, ratio, count as usize)
+    };
+    lights.par_iter().enumerate().filter_map(finish).collect()
 }
 
-/// The lights of one face.
-fn face_lights(sources: &Sources, lights: &Lights, run: &[u32], count: usize) -> Vec<BakedLight> {
-    let Some(face) = run.first().map(|&l| lights.lights[l as usize].face as usize) else { return Vec::new() };
-    let candidates = candidates(sources, face);
-    let region = sources.patches.regions[sources.mesh.faces[face].region as usize];
+/// One light with colours and samples; `None` if it stands for nothing that shines.
+fn finish_light(
+    sources: &Sources,
+    number: usize,
+    light: &Light,
+    ratio: f32,
+    count: usize,
+) -> Option<BakedLight> {
+    let candidates = candidates(sources, number, light);
+    let region = sources.patches.regions[sources.mesh.faces[light.face as usize].region as usize];
     let object = sources.scene.primitives[region.primitive as usize].object;
     let steering = &sources.scene.objects[object as usize].steering;
-    let surface_area: f64 = candidates.iter().map(|c| c.point.area).sum();
-    let ratio = (surface_area / sources.mesh.area(face)).min(MOST_AREA_RATIO) as f32;
-    if candidates.is_empty() {
-        return Vec::new();
-    }
-    let owned = share_out(lights, run, &candidates);
-    run.iter()
-        .zip(owned)
-        .map(|(&l, own)| {
-            let light = BakedLight {
-                corners: lights.corners(l as usize),
-                object,
-                tag: sources.tags[face],
-                ..BakedLight::default()
-            };
-            colour(light, &own, ratio, steering, count)
-        })
-        .filter(|light| !light.samples.is_empty() || light.emission != Vec3::ZERO)
-        .collect()
+    let bare =
+        BakedLight { corners: light.corners, object, tag: sources.tags[number], ..BakedLight::default() };
+    let finished = colour(bare, &candidates, ratio, steering, count);
+    (!finished.samples.is_empty() || finished.emission != Vec3::ZERO).then_some(finished)
 }
 
-/// The points of a face with the colours of the surface there, each the mean over the point's share of the area.
-fn candidates<'a>(sources: &Sources<'a>, face: usize) -> Vec<Candidate<'a>> {
-    let of = |&p: &u32| {
+/// The points of a light with the colours of the surface there, each the mean over the point's share of the area. A light that got
+/// none borrows the point of its face that is nearest to its centre.
+fn candidates<'a>(sources: &Sources<'a>, number: usize, light: &Light) -> Vec<Candidate<'a>> {
+    let coloured = |&p: &u32| {
         let point = &sources.points[p as usize];
         let triangle = sources.patches.triangle_source[point.triangle as usize];
         let surface = sources.scene.albedo_at(triangle as usize, point.barycentric, point.area as f32);
         Candidate { point, albedo: surface.reflectance(), emission: surface.emission * PI }
     };
-    sources.standing.of(face).iter().map(of).collect()
-}
-
-/// Gives each candidate to the nearest light of the face; a light that gets none borrows the candidate nearest to its centre.
-fn share_out<'a>(lights: &Lights, run: &[u32], candidates: &[Candidate<'a>]) -> Vec<Vec<Candidate<'a>>> {
-    let origin = candidates[0].point.position;
-    let near = |p: DVec3| Vec3A::from((p - origin).as_vec3());
-    let corners: Vec<[Vec3A; 3]> = run.iter().map(|&l| lights.corners(l as usize).map(near)).collect();
-    let mut owned = vec![Vec::new(); run.len()];
-    for candidate in candidates {
-        let p = near(candidate.point.position);
-        let away = |i: &usize| closest_point(&corners[*i], p).distance_squared(p);
-        if let Some(nearest) = (0..run.len()).min_by(|a, b| away(a).total_cmp(&away(b))) {
-            owned[nearest].push(*candidate);
-        }
+    let own = sources.of_lights.of(number);
+    if !own.is_empty() {
+        return own.iter().map(coloured).collect();
     }
-    for (own, corners) in owned.iter_mut().zip(&corners).filter(|(own, _)| own.is_empty()) {
-        let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
-        let away = |c: &&Candidate| near(c.point.position).distance_squared(centre);
-        own.extend(candidates.iter().min_by(|a, b| away(a).total_cmp(&away(b))));
-    }
-    owned
+    let centre = light.corners.iter().sum::<DVec3>() / 3.0;
+    let away = |p: &&u32| sources.points[**p as usize].position.distance_squared(centre);
+    let nearest = sources.of_faces.of(light.face as usize).iter().min_by(|a, b| away(a).total_cmp(&away(b)));
+    nearest.map(coloured).into_iter().collect()
 }
 
 /// Finishes a light from its candidates.
@@ -154,6 +140,9 @@ fn colour(
     steering: &Steering,
     count: usize,
 ) -> BakedLight {
+    if candidates.is_empty() {
+        return light;
+    }
     let strength = steering.tint * steering.intensity;
     let each = 1.0 / candidates.len() as f32;
     light.albedo = candidates.iter().map(|c| c.albedo).sum::<Vec3>() * each;

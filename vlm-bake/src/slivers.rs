@@ -8,7 +8,7 @@ use crate::decimate::{Face, LightMesh};
 use crate::topology::{EdgeUse, aspect_ratio, cross_of, edge_uses, edges};
 
 /// The greatest aspect ratio of a light (longest edge over height).
-pub const MAX_ASPECT: f64 = 100.0;
+pub const MAX_ASPECT: f64 = vlm_format::MAX_ASPECT_RATIO;
 
 /// Faces are thinned out at a lower ratio than a light may have, since the offset changes their shapes a little afterwards.
 const TARGET_ASPECT: f64 = 0.7 * MAX_ASPECT;

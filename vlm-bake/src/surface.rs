@@ -3,15 +3,17 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use crate::bvh::Bvh;
 use crate::decimate::LightMesh;
 use crate::grouped_bvh::GroupedBvh;
 use crate::patches::Patches;
+use crate::refine::Light;
 use crate::topology::cross_of;
 
 /// A face stands only for points whose normal is at most this far (cosine) from its own. Lower values let a face stand
 /// for the side walls of what was decimated away, which it can never clear; higher values leave more of the surface without
 /// a light.
-const LEAST_COSINE: f64 = 0.3;
+const LEAST_COSINE: f64 = 0.8;
 
 /// A point on the visible surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,7 +124,47 @@ pub fn stand_ins(
         .collect()
 }
 
-/// The numbers of the points for which each face stands, as offsets and a list.
+/// Hands the points of each face on to the lights that it was divided into: the light that stands for each point is the
+/// nearest of its face. `lights` are in the order of their faces.
+#[must_use]
+pub fn hand_on(points: &[SurfacePoint], standing: &Standing, lights: &[Light]) -> Vec<Option<u32>> {
+    let mut light_of = vec![None; points.len()];
+    let numbers: Vec<u32> = (0..lights.len() as u32).collect();
+    let runs: Vec<&[u32]> =
+        numbers.chunk_by(|&a, &b| lights[a as usize].face == lights[b as usize].face).collect();
+    let nearest: Vec<Vec<(u32, u32)>> =
+        runs.par_iter().map(|run| nearest_of(points, standing, lights, run)).collect();
+    for (point, light) in nearest.into_iter().flatten() {
+        light_of[point as usize] = Some(light);
+    }
+    light_of
+}
+
+/// For each point of a face, the nearest of the face's lights.
+fn nearest_of(
+    points: &[SurfacePoint],
+    standing: &Standing,
+    lights: &[Light],
+    run: &[u32],
+) -> Vec<(u32, u32)> {
+    let Some(&first) = run.first() else { return Vec::new() };
+    let own = standing.of(lights[first as usize].face as usize);
+    if run.len() == 1 {
+        return own.iter().map(|&p| (p, first)).collect();
+    }
+    let origin = lights[first as usize].corners[0];
+    let corners = run.iter().flat_map(|&l| lights[l as usize].corners);
+    let local: Vec<Vec3> = corners.map(|p| (p - origin).as_vec3()).collect();
+    let triangles: Vec<[u32; 3]> = (0..run.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let bvh = Bvh::new(&local, &triangles);
+    let light_at = |p: &u32| {
+        let near = bvh.closest((points[*p as usize].position - origin).as_vec3(), f32::INFINITY, |_| true)?;
+        Some((*p, run[near.triangle as usize]))
+    };
+    own.iter().filter_map(light_at).collect()
+}
+
+/// The numbers of the points for which each face (or light) stands, as offsets and a list.
 #[derive(Clone, Debug, Default)]
 pub struct Standing {
     starts: Vec<u32>,
@@ -130,7 +172,7 @@ pub struct Standing {
 }
 
 impl Standing {
-    /// Inverts [`stand_ins`] for that many faces.
+    /// Inverts [`stand_ins`] or [`hand_on`] for that many faces or lights.
     #[must_use]
     pub fn new(stand_ins: &[Option<u32>], faces: usize) -> Self {
         let mut starts = vec![0u32; faces + 1];

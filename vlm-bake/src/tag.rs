@@ -1,6 +1,6 @@
 //! Stage 7: ids for the lights that cannot hide behind their surface. A receiver is never lit by a light of its own tag.
 //!
-//! Automatic tags go to primitives: a primitive with two-sided surface, or one whose faces `verify` could not clear, gets an
+//! Automatic tags go to primitives: a primitive with two-sided surface, or one whose lights `verify` could not clear, gets an
 //! id; only the lights that need it carry it. An artist's tag (`extras.vlm.tag`) holds for all lights and primitives of its object, and
 //! wins.
 
@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use crate::decimate::LightMesh;
 use crate::patches::Patches;
+use crate::refine::Light;
 use crate::scene::Scene;
 use crate::topology::cross_of;
 use crate::verify::Violation;
@@ -23,7 +24,7 @@ pub enum TagReason {
     Authored,
     /// Both sides of the surface reflect.
     TwoSided,
-    /// The check found faces that light their own surface or come out of it.
+    /// The check found lights that light their own surface or come out of it.
     Uncleared,
 }
 
@@ -40,8 +41,8 @@ pub struct TagReport {
     pub primitive: u32,
     /// Why.
     pub reason: TagReason,
-    /// Faces that carry it (before they are divided into lights).
-    pub faces: usize,
+    /// Lights that carry it.
+    pub lights: usize,
     /// Their area in square metres.
     pub area_m2: f64,
 }
@@ -49,8 +50,8 @@ pub struct TagReport {
 /// The tags of a scene.
 #[derive(Clone, Debug, Default)]
 pub struct Tags {
-    /// Per face of the light mesh, 0 for none.
-    pub faces: Vec<u32>,
+    /// Per light, 0 for none.
+    pub lights: Vec<u32>,
     /// By glTF mesh and primitive: instances of a mesh share the primitive, and so its tag.
     by_primitive: BTreeMap<(u32, u32), TagReport>,
     last: u32,
@@ -91,35 +92,41 @@ impl Tags {
                 *last += 1;
                 *last
             });
-            TagReport { tag, object: object.path.clone(), mesh, primitive, reason, faces: 0, area_m2: 0.0 }
+            TagReport { tag, object: object.path.clone(), mesh, primitive, reason, lights: 0, area_m2: 0.0 }
         });
         entry.reason = entry.reason.min(reason);
-        entry.faces += 1;
+        entry.lights += 1;
         entry.area_m2 += area_m2;
         entry.tag
     }
 }
 
-/// Gives tags to the failing faces, to the faces of two-sided surfaces, and to all that the artist tagged.
+/// Gives tags to the failing lights, to the lights of two-sided surfaces, and to all that the artist tagged.
 #[must_use]
-pub fn tag(scene: &Scene, patches: &Patches, mesh: &LightMesh, violations: &[Violation]) -> Tags {
-    let mut failing = vec![false; mesh.faces.len()];
+pub fn tag(
+    scene: &Scene,
+    patches: &Patches,
+    mesh: &LightMesh,
+    lights: &[Light],
+    violations: &[Violation],
+) -> Tags {
+    let mut failing = vec![false; lights.len()];
     for violation in violations {
-        failing[violation.face as usize] = true;
+        failing[violation.light as usize] = true;
     }
     // Automatic ids follow the authored ones, so that the two never meet.
     let last = scene.objects.iter().filter_map(|o| o.steering.tag).max().unwrap_or(0);
-    let mut tags = Tags { faces: vec![0; mesh.faces.len()], last, ..Tags::default() };
-    for (f, face) in mesh.faces.iter().enumerate() {
-        let region = &patches.regions[face.region as usize];
+    let mut tags = Tags { lights: vec![0; lights.len()], last, ..Tags::default() };
+    for (l, light) in lights.iter().enumerate() {
+        let region = &patches.regions[mesh.faces[light.face as usize].region as usize];
         let object = &scene.objects[scene.primitives[region.primitive as usize].object as usize];
         let reason = match object.steering.tag {
             Some(_) => TagReason::Authored,
             None if region.two_sided => TagReason::TwoSided,
-            None if failing[f] => TagReason::Uncleared,
+            None if failing[l] => TagReason::Uncleared,
             None => continue,
         };
-        tags.faces[f] = tags.add(scene, region.primitive, reason, mesh.area(f));
+        tags.lights[l] = tags.add(scene, region.primitive, reason, light.area());
     }
     tags
 }

@@ -7,7 +7,9 @@ use vlm_format::{Grid, Sample, Settings, Vlm, VlmAsset};
 use crate::options::BakeOptions;
 use crate::samples::BakedLight;
 use crate::scene::Scene;
+use crate::slivers::MAX_ASPECT;
 use crate::tag::Tags;
+use crate::topology::aspect_ratio;
 
 /// The tool's name and version as files carry it.
 pub const GENERATOR: &str = concat!("vlm-bake ", env!("CARGO_PKG_VERSION"));
@@ -130,9 +132,14 @@ impl NodeSpace {
     }
 }
 
-/// True if a light can be expressed in the space of its node: the node's transform has an inverse.
+/// True if a light survives the way into the file: its node's transform has an inverse, and in the node's space, in single
+/// precision, it is no thinner than a light may be.
 #[must_use]
 pub fn placeable(scene: &Scene, light: &BakedLight) -> bool {
     let world_from_node = scene.objects[light.object as usize].world_from_node;
-    world_from_node.determinant() != 0.0 && world_from_node.inverse().is_finite()
+    let to_node = NodeSpace::new(world_from_node);
+    let stored = light.corners.map(|p| to_node.point(p));
+    world_from_node.determinant() != 0.0
+        && stored.iter().all(|p| p.is_finite())
+        && aspect_ratio(stored.map(|p| p.as_dvec3())).max(aspect_ratio(light.corners)) <= MAX_ASPECT
 }

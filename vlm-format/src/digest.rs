@@ -71,20 +71,39 @@ impl<'a> Source<'a> {
         Self { file, world_from_nodes, meshes: HashMap::new(), images: HashMap::new() }
     }
 
-    /// Geometry and colours of a node's mesh, in node space.
+    /// Geometry and colours of a node's mesh, in node space, morphed and skinned as at rest.
     pub(crate) fn geometry(&mut self, node: usize) -> Result<String, Error> {
-        let mesh = array(self.file.json(), "/nodes").get(node).and_then(|node| index(node, "mesh"));
-        let Some(mesh) = mesh else { return Ok(Hasher::default().finish()) };
-        if let Some(known) = self.meshes.get(&mesh) {
+        let mut hasher = Hasher::default();
+        let node = self.file.document().nodes().nth(node);
+        if let Some((node, mesh)) = node.and_then(|node| Some((node.clone(), node.mesh()?))) {
+            hasher.bytes(self.mesh(&mesh)?.as_bytes());
+            hasher.floats(node.weights().or(mesh.weights()).unwrap_or_default());
+            if let Some(skin) = node.skin() {
+                self.skin(&skin, &mut hasher)?;
+            }
+        }
+        Ok(hasher.finish())
+    }
+
+    fn mesh(&mut self, mesh: &gltf::Mesh<'_>) -> Result<String, Error> {
+        if let Some(known) = self.meshes.get(&mesh.index()) {
             return Ok(known.clone());
         }
         let mut hasher = Hasher::default();
-        for primitive in self.file.document().meshes().nth(mesh).iter().flat_map(gltf::Mesh::primitives) {
+        for primitive in mesh.primitives() {
             self.primitive(&primitive, &mut hasher)?;
         }
         let digest = hasher.finish();
-        self.meshes.insert(mesh, digest.clone());
+        self.meshes.insert(mesh.index(), digest.clone());
         Ok(digest)
+    }
+
+    /// Where the joints stand, in world space as a skin is.
+    fn skin(&self, skin: &gltf::Skin<'_>, hasher: &mut Hasher) -> Result<(), Error> {
+        for joint in skin.joints() {
+            hasher.matrix(&self.world_from_nodes.get(joint.index()).copied().unwrap_or_default());
+        }
+        self.accessor(skin.inverse_bind_matrices(), hasher)
     }
 
     /// The global transform of a node, and its instances.
@@ -117,10 +136,17 @@ impl<'a> Source<'a> {
 
     fn primitive(&mut self, primitive: &gltf::Primitive<'_>, hasher: &mut Hasher) -> Result<(), Error> {
         hasher.number(u64::from(primitive.mode().as_gl_enum()));
-        let positions = primitive.get(&gltf::Semantic::Positions);
-        let colors = primitive.get(&gltf::Semantic::Colors(0));
-        for accessor in [positions, colors] {
-            self.accessor(accessor, hasher)?;
+        let vertices = [
+            gltf::Semantic::Positions,
+            gltf::Semantic::Colors(0),
+            gltf::Semantic::Joints(0),
+            gltf::Semantic::Weights(0),
+        ];
+        for semantic in vertices {
+            self.accessor(primitive.get(&semantic), hasher)?;
+        }
+        for target in primitive.morph_targets() {
+            self.accessor(target.positions(), hasher)?;
         }
         let indices = primitive.indices().map(|accessor| self.file.read_u32(accessor.index())).transpose()?;
         let indices: Vec<u8> = indices.unwrap_or_default().into_iter().flat_map(u32::to_le_bytes).collect();

@@ -10,7 +10,7 @@ use crate::digest::{self, Source};
 use crate::error::{Error, Issue, Stale};
 use crate::nodes;
 use crate::strip::EXTENSION;
-use crate::validate::validate;
+use crate::validate::validate_in;
 
 /// Reads the Virtual Light Meshes of a file; `None` if it has none.
 ///
@@ -49,7 +49,7 @@ fn read(file: &GltfFile, trust: Trust) -> Result<Option<VlmAsset>, Error> {
         reader.compare_sources(&asset)?;
         reader.fail_if_stale()?;
     }
-    match validate(&asset) {
+    match validate_in(file, &asset) {
         issues if issues.is_empty() => Ok(Some(asset)),
         issues => Err(Error::Invalid { file: file.name().to_owned(), issues }),
     }
@@ -195,17 +195,19 @@ impl Reader<'_> {
         let parents = nodes::parents(self.file);
         let mut bearers: Vec<Option<usize>> = vec![None; asset.vlms.len()];
         for (node, json) in array(self.file.json(), "/nodes").iter().enumerate() {
-            let Some(id) = own(json).and_then(|own| own.get("vlm")?.as_str()) else { continue };
+            let ids = own(json).map_or(&[][..], |own| array(own, "/vlms")).iter().filter_map(Value::as_str);
             let path = || nodes::path(self.file, &parents, node);
-            match asset.vlms.iter().position(|vlm| vlm.id == id) {
-                None => self.outdated(id, format!("`{}` refers to it, but it does not exist", path())),
-                Some(vlm) => match bearers[vlm] {
-                    None => bearers[vlm] = Some(node),
-                    Some(first) => {
-                        let first = nodes::path(self.file, &parents, first);
-                        self.outdated(id, format!("both `{first}` and `{}` refer to it", path()));
-                    }
-                },
+            for id in ids {
+                match asset.vlms.iter().position(|vlm| vlm.id == id) {
+                    None => self.outdated(id, format!("`{}` refers to it, but it does not exist", path())),
+                    Some(vlm) => match bearers[vlm] {
+                        None => bearers[vlm] = Some(node),
+                        Some(first) => {
+                            let first = nodes::path(self.file, &parents, first);
+                            self.outdated(id, format!("both `{first}` and `{}` refer to it", path()));
+                        }
+                    },
+                }
             }
         }
         for (vlm, bearer) in asset.vlms.iter_mut().zip(bearers) {

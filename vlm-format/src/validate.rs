@@ -2,21 +2,27 @@
 
 use std::collections::HashSet;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::asset::{Grid, VlmAsset};
+use crate::check::array;
+use crate::container::GltfFile;
 use crate::error::{Code, Issue};
+use crate::nodes;
 
 /// Longest edge over height that a light may have: beyond it, single precision cannot hold its form factor.
 pub const MAX_ASPECT_RATIO: f64 = 100.0;
 
-/// How far the aspect ratio may exceed its limit through rounding of the vertices to single precision.
-const ASPECT_SLACK: f64 = 1.001;
+/// How far the aspect ratio may exceed its limit, through rounding of the vertices to single precision: the height of a
+/// light of 0.1 mm, 10 m from the origin, is only known to 1 %. Higher values admit worse form factors; lower ones refuse
+/// a bake that kept the rule in double precision.
+const ASPECT_SLACK: f64 = 1.05;
 
 /// How far the length of a sample's normal may be from 1.
 const NORMAL_SLACK: f32 = 1e-3;
 
-/// All rules that the asset breaks; empty for a valid one. Pointers name fields of [`VlmAsset`], as `/vlms/0/lights`.
+/// All rules that the asset breaks by itself; empty for a valid one. Pointers name fields of [`VlmAsset`], such as
+/// `/vlms/0/lights`.
 pub fn validate(asset: &VlmAsset) -> Vec<Issue> {
     let mut issues = Issues::default();
     lengths(asset, &mut issues);
@@ -31,6 +37,62 @@ pub fn validate(asset: &VlmAsset) -> Vec<Issue> {
         }
     }
     issues.0
+}
+
+/// The rules of [`validate`], and those that concern the file around the asset: nodes and primitives exist, and lights are
+/// well shaped in world space, where their form factors are computed.
+pub(crate) fn validate_in(file: &GltfFile, asset: &VlmAsset) -> Vec<Issue> {
+    let mut issues = Issues(validate(asset));
+    if issues.0.is_empty() {
+        references(file, asset, &mut issues);
+        aspect_ratios(file, asset, &mut issues);
+    }
+    issues.0
+}
+
+fn references(file: &GltfFile, asset: &VlmAsset, issues: &mut Issues) {
+    let (nodes, meshes) = (array(file.json(), "/nodes"), array(file.json(), "/meshes"));
+    issues.check_all(&asset.vlms, Code::VlmNode, "/vlms", "there is no such node", |vlm| {
+        (vlm.node as usize) < nodes.len()
+    });
+    issues.check_all(
+        &asset.primitive_tags,
+        Code::VlmNode,
+        "/primitive_tags",
+        "there is no such primitive",
+        |&(mesh, primitive, _)| {
+            let mesh = meshes.get(mesh as usize);
+            mesh.is_some_and(|mesh| (primitive as usize) < array(mesh, "/primitives").len())
+        },
+    );
+}
+
+fn aspect_ratios(file: &GltfFile, asset: &VlmAsset, issues: &mut Issues) {
+    let world_from_nodes = nodes::world_from_nodes(file, &nodes::parents(file));
+    for vlm in &asset.vlms {
+        let world_from_node = world_from_nodes.get(vlm.node as usize).copied().unwrap_or_default();
+        let corner = |&vertex: &u32| {
+            let position = asset.positions.get(vertex as usize).copied().unwrap_or_default();
+            world_from_node.transform_point3(position.as_dvec3())
+        };
+        let triangles = slice(&asset.triangles, vlm.lights).unwrap_or_default();
+        let ratios = triangles.iter().map(|triangle| aspect_ratio(triangle.each_ref().map(corner)));
+        for (i, ratio) in ratios.enumerate().filter(|(_, ratio)| *ratio > MAX_ASPECT_RATIO * ASPECT_SLACK) {
+            let pointer = format!("/triangles/{}", vlm.lights[0] as usize + i);
+            issues.check(false, Code::VlmAspect, &pointer, || {
+                format!("the longest edge is {ratio:.0} times the height, more than {MAX_ASPECT_RATIO}")
+            });
+        }
+    }
+}
+
+/// Longest edge over the height on it; infinite for a degenerate triangle.
+///
+/// `height = 2 area / longest`, so `longest / height = longest^2 / (2 area)`, where `2 area = |(b - a) x (c - a)|`.
+fn aspect_ratio([a, b, c]: [DVec3; 3]) -> f64 {
+    let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+    let ratio = longest / (b - a).cross(c - a).length();
+    if ratio.is_nan() { f64::INFINITY } else { ratio }
 }
 
 #[derive(Default)]
@@ -76,7 +138,7 @@ fn lengths(asset: &VlmAsset, issues: &mut Issues) {
 /// Ids are unique, ranges follow each other without gaps, and triangles stay within their VLM's vertices.
 fn vlms(asset: &VlmAsset, issues: &mut Issues) {
     let mut ends = [0_u64; 2];
-    let (mut ids, mut nodes) = (HashSet::new(), HashSet::new());
+    let mut ids = HashSet::new();
     for (i, vlm) in asset.vlms.iter().enumerate() {
         let pointer = format!("/vlms/{i}");
         for (end, (range, name)) in ends.iter_mut().zip([(vlm.lights, "lights"), (vlm.vertices, "vertices")])
@@ -88,9 +150,6 @@ fn vlms(asset: &VlmAsset, issues: &mut Issues) {
         }
         issues.check(ids.insert(&vlm.id) && !vlm.id.is_empty(), Code::VlmId, &pointer, || {
             format!("the id `{}` is empty or not unique", vlm.id)
-        });
-        issues.check(nodes.insert(vlm.node), Code::VlmId, &pointer, || {
-            format!("node {} bears another VLM too", vlm.node)
         });
         triangles_within(asset, i, issues);
     }
@@ -123,23 +182,6 @@ fn lights(asset: &VlmAsset, issues: &mut Issues) {
     issues.check_all(&asset.positions, Code::VlmNumber, "/positions", "not finite", finite);
     issues.check_all(&asset.albedo, Code::VlmNumber, "/albedo", "not finite", finite);
     issues.check_all(&asset.emission, Code::VlmNumber, "/emission", "not finite", finite);
-    issues.check_all(
-        &asset.triangles,
-        Code::VlmAspect,
-        "/triangles",
-        "degenerate, or longer than 100 times its height",
-        |triangle| aspect_ratio(asset, triangle).is_none_or(|ratio| ratio <= MAX_ASPECT_RATIO * ASPECT_SLACK),
-    );
-}
-
-/// Longest edge over the height on it, infinite for a degenerate triangle; `None` if a vertex does not exist.
-fn aspect_ratio(asset: &VlmAsset, triangle: &[u32; 3]) -> Option<f64> {
-    let corner = |i: usize| asset.positions.get(triangle[i] as usize).map(|position| position.as_dvec3());
-    let (a, b, c) = (corner(0)?, corner(1)?, corner(2)?);
-    let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
-    // height = 2 area / longest edge, so edge / height = edge^2 / (2 area)
-    Some(longest / (b - a).cross(c - a).length())
-        .map(|ratio| if ratio.is_nan() { f64::INFINITY } else { ratio })
 }
 
 fn samples(asset: &VlmAsset, issues: &mut Issues) {
@@ -262,6 +304,14 @@ mod tests {
     }
 
     #[test]
+    fn the_aspect_ratio_is_longest_edge_over_height() {
+        let triangle = |height: f64| [DVec3::ZERO, DVec3::X, DVec3::new(0.3, height, 0.0)];
+        assert!((aspect_ratio(triangle(0.01)) - 100.0).abs() < 1e-9);
+        assert_eq!(aspect_ratio(triangle(0.0)), f64::INFINITY);
+        assert_eq!(aspect_ratio([DVec3::ZERO; 3]), f64::INFINITY);
+    }
+
+    #[test]
     fn every_broken_rule_is_seen() {
         type Break = fn(&mut VlmAsset);
         let cases: &[(Code, &str, Break)] = &[
@@ -275,8 +325,6 @@ mod tests {
             (Code::VlmIndex, "/triangles/1", |a| a.triangles[1][2] = 4),
             (Code::VlmNumber, "/positions/3", |a| a.positions[3].x = f32::NAN),
             (Code::VlmNumber, "/albedo/0", |a| a.albedo[0].y = f32::INFINITY),
-            (Code::VlmAspect, "/triangles/0", |a| a.triangles[0] = [0, 1, 1]),
-            (Code::VlmAspect, "/triangles/0", |a| a.positions[1] = Vec3::new(0.502, 0.0, 0.498)),
             (Code::VlmNumber, "/samples/1", |a| a.samples[1].normal = Vec3::ZERO),
             (Code::VlmOrder, "/sample_starts", |a| a.sample_starts = vec![0, 2, 1]),
             (Code::VlmOrder, "/primitive_tags", |a| a.primitive_tags = vec![(0, 1, 1), (0, 0, 1)]),

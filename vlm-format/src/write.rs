@@ -1,5 +1,7 @@
 //! Writes a [`VlmAsset`] into a glTF file: patches the JSON, appends to the data, touches nothing else.
 
+use std::collections::BTreeMap;
+
 use glam::Vec3;
 use serde_json::{Map, Value, json};
 
@@ -7,10 +9,10 @@ use crate::asset::{Grid, Sample, VlmAsset};
 use crate::check::array;
 use crate::container::GltfFile;
 use crate::digest::{self, Source};
-use crate::error::{Code, Error, Issue};
+use crate::error::Error;
 use crate::package::{OutputFile, Parts, Target};
 use crate::strip::{EXTENSION, strip};
-use crate::validate::validate;
+use crate::validate::validate_in;
 
 /// Adds Virtual Light Meshes to a file. Those that it has already are replaced.
 ///
@@ -22,8 +24,7 @@ use crate::validate::validate;
 /// [`Error::Asset`] if the asset breaks its invariants or names nodes or primitives that the file lacks;
 /// [`Error::Invalid`] if the geometry cannot be read or the output would be too large.
 pub fn write_vlm(file: &GltfFile, asset: &VlmAsset, target: &Target) -> Result<Vec<OutputFile>, Error> {
-    let mut issues = validate(asset);
-    issues.extend(check_references(file, asset));
+    let issues = validate_in(file, asset);
     if !issues.is_empty() {
         return Err(Error::Asset { issues });
     }
@@ -46,29 +47,6 @@ pub fn strip_vlm(file: &GltfFile, target: &Target) -> Result<Vec<OutputFile>, Er
     strip(&mut parts);
     parts.convert(file, target);
     parts.pack(target)
-}
-
-/// Nodes and primitives that the asset names exist.
-fn check_references(file: &GltfFile, asset: &VlmAsset) -> Vec<Issue> {
-    let (nodes, meshes) = (array(file.json(), "/nodes"), array(file.json(), "/meshes"));
-    let mut issues = Vec::new();
-    for (i, vlm) in asset.vlms.iter().enumerate() {
-        if vlm.node as usize >= nodes.len() {
-            issues.push(Issue::error(
-                Code::VlmNode,
-                format!("/vlms/{i}/node"),
-                format!("there is no node {}", vlm.node),
-            ));
-        }
-    }
-    for (i, (mesh, primitive, _)) in asset.primitive_tags.iter().enumerate() {
-        let primitives = meshes.get(*mesh as usize).map_or(&[][..], |mesh| array(mesh, "/primitives"));
-        if *primitive as usize >= primitives.len() {
-            let message = format!("there is no primitive {primitive} of mesh {mesh}");
-            issues.push(Issue::error(Code::VlmNode, format!("/primitive_tags/{i}"), message));
-        }
-    }
-    issues
 }
 
 /// The arrays of an asset on their way into one buffer view.
@@ -282,9 +260,13 @@ fn add_buffer(parts: &mut Parts, bytes: Vec<u8>, target: &Target) -> Place {
 
 /// Marks the nodes that bear lights and the primitives that are tagged.
 fn refer(json: &mut Value, asset: &VlmAsset) {
+    let mut ids: BTreeMap<u32, Vec<&str>> = BTreeMap::new();
     for vlm in &asset.vlms {
-        if let Some(node) = json.pointer_mut(&format!("/nodes/{}", vlm.node)) {
-            insert_extension(node, json!({ "vlm": vlm.id }));
+        ids.entry(vlm.node).or_default().push(&vlm.id);
+    }
+    for (node, ids) in ids {
+        if let Some(node) = json.pointer_mut(&format!("/nodes/{node}")) {
+            insert_extension(node, json!({ "vlms": ids }));
         }
     }
     for (mesh, primitive, tag) in &asset.primitive_tags {

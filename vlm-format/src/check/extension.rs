@@ -1,6 +1,6 @@
 //! The shape of `VLM_virtual_light_mesh`, as tables.
 
-use super::shape::Shape::{self, Bool, Count, List, Number, Numbers, Object, Objects, Small, Text};
+use super::shape::Shape::{self, Bool, Count, List, Number, Numbers, Object, Objects, Small, Text, Texts};
 use super::shape::{Field, may, must};
 use super::tables::{ACCESSOR, VIEW};
 
@@ -9,7 +9,7 @@ const NAME: &str = "VLM_virtual_light_mesh";
 /// The extension's objects in the root, in nodes and in primitives; nothing else of the file.
 pub(super) const EXTENSION: &[Field] = &[
     may("extensions", Object(&[may(NAME, Object(ROOT))])),
-    may("nodes", List(&Object(&[may("extensions", Object(&[may(NAME, Object(&[must("vlm", Text)]))]))]))),
+    may("nodes", List(&Object(&[may("extensions", Object(&[may(NAME, Object(&[must("vlms", Texts)]))]))]))),
     may(
         "meshes",
         Objects(&[must(

@@ -4,7 +4,13 @@
 //! 2 it could not run.
 
 mod error;
+mod input;
+mod output;
 mod progress;
+mod bake;
+mod check;
+mod inspect;
+mod strip;
 mod render;
 
 use std::process::ExitCode;
@@ -22,12 +28,24 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Bake Virtual Light Meshes into a glTF file
+    Bake(bake::BakeArgs),
+    /// Check that files are valid and that their Virtual Light Meshes still fit them
+    Check(check::CheckArgs),
+    /// Show what is in a file's Virtual Light Meshes
+    Inspect(inspect::InspectArgs),
+    /// Take the Virtual Light Meshes out of a file
+    Strip(strip::StripArgs),
     /// Render a picture on the CPU
     Render(render::RenderArgs),
 }
 
 fn main() -> ExitCode {
     let result: Result<(), CliError> = match Cli::parse().command {
+        Command::Bake(args) => bake::run(&args),
+        Command::Check(args) => check::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
+        Command::Strip(args) => strip::run(&args),
         Command::Render(args) => render::run(&args),
     };
     match result {

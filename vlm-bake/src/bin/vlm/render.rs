@@ -1,16 +1,17 @@
 //! `vlm render`: a picture of a glTF, lit directly and by one bounce.
 
-use std::io::{Read, stdin};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use vlm_bake::picture::{write_irradiance, write_png};
 use vlm_bake::progress::Progress;
 use vlm_bake::render::{Method, RenderOptions, RenderReport, Rendering, render};
 use vlm_bake::scene::{LoadOptions, load};
-use vlm_format::{GltfFile, read_vlm};
+use vlm_format::read_vlm;
 
 use crate::error::CliError;
+use crate::input::open;
+use crate::output::{print, print_json};
 use crate::progress::Bars;
 
 /// Flags of `vlm render`.
@@ -36,6 +37,9 @@ pub struct RenderArgs {
     /// Write the picture, tone mapped
     #[arg(long, value_name = "IMG.png")]
     out: Option<PathBuf>,
+    /// What the picture multiplies radiance (nt) by [default: chosen so that the mean brightness shows as middle grey]
+    #[arg(long, value_name = "FACTOR", value_parser = positive)]
+    exposure: Option<f32>,
     /// Write the indirect irradiance in lx, RGB float32, 0 where nothing is hit
     #[arg(long, value_name = "E1.exr")]
     irradiance: Option<PathBuf>,
@@ -65,6 +69,11 @@ impl From<MethodArg> for Method {
             MethodArg::Reference => Self::Reference,
         }
     }
+}
+
+fn positive(text: &str) -> Result<f32, String> {
+    let number = text.parse::<f32>().ok().filter(|value| value.is_finite() && *value > 0.0);
+    number.ok_or_else(|| "expected a number above 0".to_owned())
 }
 
 fn size(text: &str) -> Result<(u32, u32), String> {
@@ -107,38 +116,29 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     print_report(args, &report, exposure)
 }
 
-fn open(input: &Path) -> Result<GltfFile, CliError> {
-    if input != Path::new("-") {
-        return Ok(GltfFile::open(input)?);
-    }
-    let mut bytes = Vec::new();
-    stdin().lock().read_to_end(&mut bytes).map_err(|e| CliError::usage(format!("standard input: {e}")))?;
-    Ok(GltfFile::from_slice(&bytes, "standard input", None)?)
-}
-
 /// Writes what was asked for; returns the picture's exposure.
 fn write_files(args: &RenderArgs, rendering: &Rendering) -> Result<Option<f32>, CliError> {
     if let Some(path) = &args.irradiance {
         write_irradiance(rendering, path)?;
     }
-    Ok(args.out.as_deref().map(|path| write_png(rendering, path, None)).transpose()?)
+    Ok(args.out.as_deref().map(|path| write_png(rendering, path, args.exposure)).transpose()?)
 }
 
 fn print_report(args: &RenderArgs, report: &RenderReport, exposure: Option<f32>) -> Result<(), CliError> {
     if args.json {
-        let json = serde_json::to_string_pretty(report);
-        println!("{}", json.map_err(|e| CliError::usage(format!("the report: {e}")))?);
-        return Ok(());
+        return print_json(report);
     }
     let RenderReport { camera, width, height, method, stats } = report;
-    println!("rendered  {width} x {height} by {method} from camera {camera}");
-    println!("time      inject {:.3} s, gather {:.3} s", stats.seconds.inject, stats.seconds.gather);
-    println!("lights    {}, {} pairs evaluated", stats.lights, stats.pairs_evaluated);
+    let mut lines = vec![
+        format!("rendered  {width} x {height} by {method} from camera {camera}"),
+        format!("time      inject {:.3} s, gather {:.3} s", stats.seconds.inject, stats.seconds.gather),
+        format!("lights    {}, {} pairs evaluated", stats.lights, stats.pairs_evaluated),
+    ];
     if let (Some(path), Some(exposure)) = (&args.out, exposure) {
-        println!("picture   {}  (radiance in nt times {exposure:.4})", path.display());
+        lines.push(format!("picture   {}  (radiance in nt times {exposure:.4})", path.display()));
     }
     if let Some(path) = &args.irradiance {
-        println!("E1        {}", path.display());
+        lines.push(format!("E1        {}", path.display()));
     }
-    Ok(())
+    print(&lines)
 }

@@ -1,0 +1,199 @@
+//! `vlm bake`: a glTF in, the same glTF with its Virtual Light Meshes out.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use vlm_bake::bake::{Bake, bake};
+use vlm_bake::options::{BakeOptions, Preset};
+use vlm_bake::picture::write_png;
+use vlm_bake::progress::Progress;
+use vlm_bake::render::{Method, RenderOptions, render};
+use vlm_bake::report::Report;
+use vlm_bake::scene::{LoadOptions, Scene, load};
+use vlm_format::{GltfFile, OutputFile, write_vlm};
+
+use crate::error::CliError;
+use crate::input::{is_pipe, open};
+use crate::output::{check_folder, deliver, print, target};
+use crate::progress::Bars;
+
+/// Size of the preview: small enough to take seconds without a GPU.
+const PREVIEW_SIZE: [u32; 2] = [640, 480];
+
+/// Bake Virtual Light Meshes into a glTF file.
+#[derive(Args)]
+pub struct BakeArgs {
+    /// glTF file (.glb or .gltf), or - for standard input (.glb)
+    input: PathBuf,
+    /// File to write (.glb or .gltf), or - for standard output (.glb)
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// What the bake costs and gives
+    #[arg(long, value_enum, default_value = "game")]
+    preset: PresetArg,
+    /// Number of lights for the whole scene [default: by preset and number of triangles]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    lights: Option<u32>,
+    /// Edge of a grid cell in metres [default: a 24th of the scene]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    cell: Option<f32>,
+    /// Write what was made as JSON
+    #[arg(long, value_name = "FILE.json")]
+    report: Option<PathBuf>,
+    /// Render a picture lit by the baked lights, from the file's first camera
+    #[arg(long, value_name = "FILE.png")]
+    preview: Option<PathBuf>,
+}
+
+/// Presets by name.
+#[derive(Clone, Copy, ValueEnum)]
+enum PresetArg {
+    /// A quick look: 5 % of the triangles as lights (120 to 4,000), 2 samples each
+    Draft,
+    /// For shipping: 20 % of the triangles (460 to 16,000), 4 samples each
+    Game,
+    /// For stills: 80 % of the triangles (1,840 to 64,000), 16 samples each
+    Quality,
+}
+
+impl From<PresetArg> for Preset {
+    fn from(preset: PresetArg) -> Self {
+        match preset {
+            PresetArg::Draft => Self::Draft,
+            PresetArg::Game => Self::Game,
+            PresetArg::Quality => Self::Quality,
+        }
+    }
+}
+
+fn positive(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("expected a length in metres above 0".to_owned()),
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Whatever keeps the file from being baked; then nothing was written.
+pub fn run(args: &BakeArgs) -> Result<(), CliError> {
+    let bars = Bars::new();
+    let target = target(&args.output)?;
+    let named = [Some(&args.output), args.report.as_ref(), args.preview.as_ref()];
+    named.into_iter().flatten().try_for_each(|path| check_folder(path))?;
+
+    bars.begin("read", 1);
+    let file = open(&args.input)?;
+    let scene = load_scene(&file, &bars)?;
+    let mut baked =
+        bake(&scene, &options(args, &scene), &bars).map_err(|error| CliError::check(file.name(), error))?;
+
+    bars.begin("write", 1);
+    let outputs = write_vlm(&file, &baked.asset, &target)?;
+    baked.report.hash = hash(&outputs);
+    deliver(&args.output, &outputs)?;
+    if let Some(path) = &args.report {
+        write_report(path, &baked.report)?;
+    }
+    let preview = args.preview.as_deref().map(|path| preview(path, &scene, &baked, &bars)).transpose()?;
+    drop(bars);
+    summarize(args, &baked.report, preview.as_deref())
+}
+
+fn load_scene(file: &GltfFile, bars: &Bars) -> Result<Scene, CliError> {
+    let on_texture = |done: usize, total: usize| {
+        if done == 1 {
+            bars.begin("textures", total as u64);
+        }
+        bars.advance(1);
+    };
+    Ok(load(file, &LoadOptions { on_texture: Some(&on_texture), ..LoadOptions::default() })?)
+}
+
+fn options(args: &BakeArgs, scene: &Scene) -> BakeOptions {
+    let mut options = BakeOptions::preset(args.preset.into(), scene.triangles.len());
+    options.lights = args.lights.unwrap_or(options.lights);
+    options.cell_size = args.cell;
+    options
+}
+
+/// BLAKE3 of everything written, in the order of writing.
+fn hash(outputs: &[OutputFile]) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for output in outputs {
+        hasher.update(&output.bytes);
+    }
+    hasher.finalize().to_hex().to_string()
+}
+
+fn write_report(path: &Path, report: &Report) -> Result<(), CliError> {
+    let broken = |e: &dyn std::fmt::Display| {
+        CliError::usage(format!("{}: the report was not written: {e}", path.display()))
+    };
+    let json = serde_json::to_string_pretty(report).map_err(|e| broken(&e))?;
+    fs::write(path, json + "\n").map_err(|e| broken(&e))
+}
+
+/// Renders the preview; returns lines that say what it shows.
+fn preview(path: &Path, scene: &Scene, baked: &Bake, bars: &Bars) -> Result<String, CliError> {
+    let mut scene = scene.clone();
+    let notes = scene.add_defaults_for_view();
+    let camera = scene.camera(None)?;
+    let [width, height] = PREVIEW_SIZE;
+    let options = RenderOptions { width, height, method: Method::Vlm, ..RenderOptions::default() };
+    let rendering = render(&scene, Some(&baked.asset), &camera, &options, bars)?;
+    let exposure = write_png(&rendering, path, None)?;
+    let mut lines = vec![format!(
+        "picture   {}  (camera {}, radiance in nt times {exposure:.4})",
+        path.display(),
+        camera.name
+    )];
+    lines.extend(notes.iter().map(|note| format!("note      {note}")));
+    Ok(lines.join("\n"))
+}
+
+/// The closing lines: what was made, in numbers. On stdout, or on stderr where stdout carries the file.
+fn summarize(args: &BakeArgs, report: &Report, preview: Option<&str>) -> Result<(), CliError> {
+    let mut lines = vec![format!("baked     {}", args.output.display())];
+    lines.push(format!(
+        "lights    {} of {} asked, for {} visible triangles; decimation error {}",
+        report.lights,
+        report.asked_lights,
+        report.visible_triangles,
+        metres(report.decimation.error_m)
+    ));
+    if !report.missed_because.is_empty() {
+        lines.push(format!("          budget missed: {}", report.missed_because));
+    }
+    lines.push(format!(
+        "clearance {} of {} surface points violated; lights lie {} deep on average, {} required",
+        report.clearance.violations,
+        report.clearance.samples,
+        metres(report.offset.mean_m),
+        metres(report.clearance.required_m)
+    ));
+    let share = 100.0 * report.area.tagged_m2.max(0.0) / report.area.lights_m2.max(f64::MIN_POSITIVE);
+    lines.push(format!("tags      {} ({share:.1} % of the lights' area)", report.tags.len()));
+    lines.push(format!(
+        "grid      {} of {} cells stored, {} entries, {:.1} kB",
+        report.grid.stored_cells,
+        report.grid.cells,
+        report.grid.entries,
+        report.grid.bytes as f64 / 1e3
+    ));
+    lines.push(format!("time      {:.2} s", report.seconds.values().sum::<f64>()));
+    lines.extend(report.notes.iter().map(|note| format!("note      {note}")));
+    lines.extend(preview.filter(|line| !line.is_empty()).map(str::to_owned));
+    if !is_pipe(&args.output) {
+        return print(&lines);
+    }
+    lines.iter().for_each(|line| eprintln!("{line}"));
+    Ok(())
+}
+
+/// A length with a unit that suits it.
+fn metres(length: f64) -> String {
+    if length < 1e-2 { format!("{:.2} mm", length * 1e3) } else { format!("{length:.3} m") }
+}

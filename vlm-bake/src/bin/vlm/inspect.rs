@@ -1,0 +1,162 @@
+//! `vlm inspect`: what is in a file's Virtual Light Meshes.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+use clap::Args;
+use glam::Vec3;
+use serde::Serialize;
+use vlm_format::{Grid, Settings, VlmAsset, read_vlm_unchecked};
+
+use crate::error::CliError;
+use crate::input::open;
+use crate::output::{print, print_json};
+
+/// Flags of `vlm inspect`.
+#[derive(Args)]
+pub struct InspectArgs {
+    /// glTF file (.glb or .gltf), or - for standard input (.glb)
+    file: PathBuf,
+    /// Report as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// The content of an asset in numbers.
+#[derive(Serialize)]
+struct Content {
+    file: String,
+    generator: String,
+    settings: Settings,
+    vlms: Vec<VlmContent>,
+    lights: usize,
+    emitting_lights: usize,
+    tagged_lights: usize,
+    vertices: usize,
+    samples: usize,
+    /// Distinct tags of lights.
+    tags: BTreeSet<u32>,
+    /// Visible primitives that carry a tag.
+    tagged_primitives: usize,
+    grid: Option<GridContent>,
+}
+
+#[derive(Serialize)]
+struct VlmContent {
+    id: String,
+    node: u32,
+    lights: u32,
+    vertices: u32,
+    authored: bool,
+}
+
+#[derive(Serialize)]
+struct GridContent {
+    cell_size_m: f32,
+    dimensions: [u32; 3],
+    cells: u64,
+    stored_cells: usize,
+    entries: usize,
+    longest_list: u32,
+    bytes: usize,
+}
+
+/// Runs the command. Stale files may be looked into; that is what `vlm check` is for.
+///
+/// # Errors
+/// If the file cannot be read, or has no Virtual Light Mesh.
+pub fn run(args: &InspectArgs) -> Result<(), CliError> {
+    let file = open(&args.file)?;
+    let Some(asset) = read_vlm_unchecked(&file)? else {
+        return Err(CliError::check(
+            file.name(),
+            "/extensions: the file has no Virtual Light Mesh; bake it first",
+        ));
+    };
+    let content = Content::of(file.name(), &asset);
+    if args.json { print_json(&content) } else { print(&content.lines()) }
+}
+
+impl Content {
+    fn of(file: &str, asset: &VlmAsset) -> Self {
+        let tags = asset.tags.iter().copied().filter(|&tag| tag != 0);
+        Self {
+            file: file.to_owned(),
+            generator: asset.generator.clone(),
+            settings: asset.settings.clone(),
+            vlms: asset.vlms.iter().map(VlmContent::of).collect(),
+            lights: asset.triangles.len(),
+            emitting_lights: asset.emission.iter().filter(|&&e| e != Vec3::ZERO).count(),
+            tagged_lights: tags.clone().count(),
+            vertices: asset.positions.len(),
+            samples: asset.samples.len(),
+            tags: tags.collect(),
+            tagged_primitives: asset.primitive_tags.len(),
+            grid: asset.grid.as_ref().map(GridContent::of),
+        }
+    }
+
+    fn lines(&self) -> Vec<String> {
+        let s = &self.settings;
+        let mut lines = vec![
+            format!("file      {}", self.file),
+            format!("made by   {}, preset {}, {} lights asked", self.generator, s.preset, s.lights),
+            format!(
+                "lights    {} ({} emit, {} tagged), {} vertices, {} samples",
+                self.lights, self.emitting_lights, self.tagged_lights, self.vertices, self.samples
+            ),
+            format!(
+                "tags      {} of lights, {} visible primitives tagged",
+                self.tags.len(),
+                self.tagged_primitives
+            ),
+        ];
+        lines.push(self.grid.as_ref().map_or_else(|| "grid      none".to_owned(), GridContent::line));
+        lines.extend(self.vlms.iter().map(VlmContent::line));
+        lines
+    }
+}
+
+impl VlmContent {
+    fn of(vlm: &vlm_format::Vlm) -> Self {
+        Self {
+            id: vlm.id.clone(),
+            node: vlm.node,
+            lights: vlm.lights[1],
+            vertices: vlm.vertices[1],
+            authored: vlm.authored,
+        }
+    }
+
+    fn line(&self) -> String {
+        let origin = if self.authored { "authored" } else { "derived" };
+        format!("vlm       {} (node {}): {} lights, {origin}", self.id, self.node, self.lights)
+    }
+}
+
+impl GridContent {
+    fn of(grid: &Grid) -> Self {
+        let lengths = grid.starts.windows(2).map(|ends| ends[1] - ends[0]);
+        Self {
+            cell_size_m: grid.cell_size,
+            dimensions: grid.dimensions,
+            cells: grid.dimensions.iter().map(|&d| u64::from(d)).product(),
+            stored_cells: grid.cells.len(),
+            entries: grid.entries.len(),
+            longest_list: lengths.max().unwrap_or(0),
+            bytes: size_of::<u32>() * (grid.cells.len() + grid.starts.len() + grid.entries.len()),
+        }
+    }
+
+    fn line(&self) -> String {
+        let [x, y, z] = self.dimensions;
+        format!(
+            "grid      {x} x {y} x {z} cells of {} m, {} stored, {} entries, at most {} lights a cell, {:.1} kB",
+            self.cell_size_m,
+            self.stored_cells,
+            self.entries,
+            self.longest_list,
+            self.bytes as f64 / 1e3
+        )
+    }
+}

@@ -1,0 +1,152 @@
+//! `vlm bake` on what is in order: what it prints, what it writes, and that it always writes the same.
+
+use insta::assert_snapshot;
+use serde_json::{Value, json};
+
+use crate::support::{Document, Folders, read, repository, run, run_with_input, text, vlm};
+
+/// The lines with every number, path and hash that may change taken out.
+fn redacted(summary: &str) -> String {
+    let mut lines = Vec::new();
+    for line in summary.lines() {
+        let words = line.split(' ').map(|word| {
+            let core = word.trim_matches(|c: char| "(),;%".contains(c));
+            if core.contains('/') {
+                word.replace(core, "[path]")
+            } else if core.parse::<f64>().is_ok() {
+                word.replace(core, "[n]")
+            } else {
+                word.to_owned()
+            }
+        });
+        lines.push(words.collect::<Vec<_>>().join(" "));
+    }
+    lines.join("\n")
+}
+
+#[test]
+fn summary_says_what_was_made_and_where_the_picture_is() {
+    let folders = Folders::new();
+    let picture = folders.output("out.png");
+    let output = run([
+        "bake",
+        &repository("assets/cornell.glb"),
+        "-o",
+        &folders.output("out.glb"),
+        "--preview",
+        &picture,
+    ]);
+    assert_eq!(output.status.code(), Some(0));
+    assert_eq!(text(&output.stderr), "", "stderr is silent in a pipe");
+    assert!(std::fs::metadata(&picture).unwrap().len() > 1000);
+    assert!(text(&output.stdout).contains(&picture));
+    assert_snapshot!(redacted(text(&output.stdout)), @"
+    baked     [path]
+    lights    [n] of [n] asked, for [n] visible triangles; decimation error [n] mm
+    clearance [n] of [n] surface points violated; lights lie [n] mm deep on average, [n] mm required
+    tags      [n] ([n] % of the lights' area)
+    grid      [n] of [n] cells stored, [n] entries, [n] kB
+    time      [n] s
+    picture   [path]  (camera camera, radiance in nt times [n])
+    ");
+}
+
+#[test]
+fn report_has_the_keys_that_others_read() {
+    let folders = Folders::new();
+    let report = folders.output("report.json");
+    let output = run([
+        "bake",
+        &repository("assets/cornell.glb"),
+        "-o",
+        &folders.output("out.glb"),
+        "--report",
+        &report,
+    ]);
+    assert_eq!(output.status.code(), Some(0));
+    let report: Value = serde_json::from_slice(&std::fs::read(report).unwrap()).unwrap();
+    for key in [
+        "/visible_triangles",
+        "/lights",
+        "/clearance/samples",
+        "/clearance/violations",
+        "/clearance/worst_m",
+        "/grid/cells",
+        "/grid/stored_cells",
+        "/grid/entries",
+        "/grid/bytes",
+        "/seconds/decimate",
+        "/asked_lights",
+    ] {
+        assert!(report.pointer(key).is_some_and(Value::is_number), "{key} in {report}");
+    }
+    assert!(report["tags"].is_array());
+    assert_eq!(report["hash"].as_str().unwrap().len(), 64);
+    assert_eq!(report["visible_triangles"], json!(34));
+    assert_eq!(report["clearance"]["violations"], json!(0));
+}
+
+#[test]
+fn pipes_carry_the_same_bytes() {
+    let folders = Folders::new();
+    let input = repository("assets/cornell.glb");
+    let written = folders.output("out.glb");
+    assert!(run(["bake", &input, "-o", &written]).status.success());
+    let piped = run_with_input(&["bake", "-", "-o", "-"], &std::fs::read(&input).unwrap());
+    assert_eq!(piped.status.code(), Some(0));
+    assert!(piped.stdout == std::fs::read(written).unwrap(), "the pipe's bytes differ from the file's");
+}
+
+#[test]
+fn same_bytes_twice_and_with_any_number_of_threads() {
+    for scene in ["cornell", "cornell_sphere"] {
+        let input = repository(&format!("assets/{scene}.glb"));
+        let bake = |threads: &str| {
+            let output = vlm(["bake", &input, "-o", "-"]).env("RAYON_NUM_THREADS", threads).output().unwrap();
+            assert!(output.status.success());
+            output.stdout
+        };
+        let first = bake("2");
+        assert!(first == bake("2"), "{scene}: twice");
+        assert!(first == bake("1"), "{scene}: with one thread");
+    }
+}
+
+#[test]
+fn the_budget_of_lights_is_met() {
+    let folders = Folders::new();
+    for asked in [120, 460, 2000] {
+        let output = folders.output("out.glb");
+        let input = repository("assets/cornell.glb");
+        assert!(run(["bake", &input, "-o", &output, "--lights", &asked.to_string()]).status.success());
+        let made = read(&output).triangles.len();
+        assert!(made.abs_diff(asked) * 20 <= asked, "{made} lights where {asked} were asked");
+    }
+}
+
+#[test]
+fn emissive_materials_become_lights() {
+    let folders = Folders::new();
+    let mut document = Document::room();
+    document.push(
+        "lamp",
+        &[[[-0.5, 1.9, -0.5], [0.5, 1.9, -0.5], [0.5, 1.9, 0.5], [-0.5, 1.9, 0.5]]],
+        Some(2),
+    );
+    let asset = folders.bake(&document, &["--lights", "200"]);
+    let lamp = asset.vlms.iter().find(|vlm| vlm.node == 1).expect("the lamp makes lights");
+    let [first, count] = lamp.lights.map(|n| n as usize);
+    assert!(count > 0);
+    // The lights are a little smaller than the lamp, having sunk into it, and emit as much. Radiosity of a Lambertian emitter
+    // is pi times the radiance in the material; the lamp has 1 m2.
+    let flux: glam::Vec3 = (first..first + count).map(|l| asset.emission[l] * area(&asset, l)).sum();
+    let expected = std::f32::consts::PI * glam::Vec3::new(1.0, 0.5, 0.25);
+    assert!(flux.abs_diff_eq(expected, 0.01 * expected.z), "{flux} where {expected} leaves the lamp");
+    assert!(asset.emission[..first].iter().all(|&e| e == glam::Vec3::ZERO), "walls do not emit");
+}
+
+/// Square metres of a light, in the space of its node.
+fn area(asset: &vlm_format::VlmAsset, light: usize) -> f32 {
+    let [a, b, c] = asset.triangles[light].map(|v| asset.positions[v as usize]);
+    (b - a).cross(c - a).length() / 2.0
+}
