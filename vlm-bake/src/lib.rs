@@ -33,6 +33,7 @@ pub mod topology;
 pub mod camera;
 pub mod shade;
 pub mod gbuffer;
+pub mod emitters;
 pub mod reference;
 pub mod render;
 pub mod picture;

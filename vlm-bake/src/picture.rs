@@ -53,7 +53,7 @@ pub fn radiance(rendering: &Rendering) -> Vec<Vec3> {
 /// If the file cannot be encoded or written; then no partial file is left.
 pub fn write_png(rendering: &Rendering, path: &Path, exposure: Option<f32>) -> Result<f32, PictureError> {
     let radiance = radiance(rendering);
-    let exposure = exposure.unwrap_or_else(|| auto_exposure(radiance.iter().copied()));
+    let exposure = exposure.unwrap_or_else(|| auto_exposure(&radiance));
     let GBuffer { width, height, points } = &rendering.gbuffer;
     let image = RgbImage::from_fn(*width, *height, |x, y| {
         let pixel = y as usize * *width as usize + x as usize;

@@ -3,6 +3,9 @@
 //! `E_1(x) = integral over the hemisphere of L(y(w)) cos(theta) dw`, where `y(w)` is the first surface in direction `w`
 //! and `L(y) = albedo / pi * E_direct(y) + L_e(y)`. With directions drawn with density `cos(theta) / pi`, the estimate
 //! is the mean of `pi L(y) = albedo * E_direct(y) + pi L_e(y)`: the mean radiosity of what the directions meet.
+//! Emitted light is also sought by points drawn on the emitters, weighed against the directions.
+
+use std::f32::consts::PI;
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -39,25 +42,79 @@ pub fn indirect_irradiance(
 /// One-bounce indirect irradiance at one point, lx, from `samples` directions; `seed` chooses them.
 #[must_use]
 pub fn irradiance_at(scene: &TraceScene<'_>, point: &SurfacePoint, samples: u32, seed: u64) -> Vec3 {
-    let origin = scene.bvh.leave(point.position, point.geometric_normal);
-    let (tangent, bitangent) = point.normal.any_orthonormal_pair();
-    let random = mix(seed.wrapping_add(0x9e37_79b9_7f4a_7c15));
-    let shift = (random as u32, (random >> 32) as u32);
+    let receiver = Receiver {
+        origin: scene.bvh.leave(point.position, point.geometric_normal),
+        tangents: point.normal.any_orthonormal_pair(),
+        point,
+    };
+    let random = |stream: u64| {
+        let bits = mix((2 * seed + stream).wrapping_add(0x9e37_79b9_7f4a_7c15));
+        (bits as u32, (bits >> 32) as u32)
+    };
+    let (toward_hemisphere, toward_emitters) = (random(0), random(1));
     let mut sum = Vec3::ZERO;
     for i in 0..samples {
-        let local = cosine_direction(shifted_hammersley(i, samples, shift));
-        let direction = tangent * local.x + bitangent * local.y + point.normal * local.z;
-        if direction.dot(point.geometric_normal) > 0.0 {
-            sum += seen_radiosity(scene, origin, direction);
+        sum += by_direction(scene, &receiver, shifted_hammersley(i, samples, toward_hemisphere));
+        if !scene.emitters.is_empty() {
+            sum += by_emitter(scene, &receiver, shifted_hammersley(i, samples, toward_emitters));
         }
     }
     sum / samples.max(1) as f32
 }
 
-/// Radiosity of the first surface on the ray, lx; backs of single-sided surfaces are black.
-fn seen_radiosity(scene: &TraceScene<'_>, origin: Vec3, direction: Vec3) -> Vec3 {
-    let lit = scene.path_hit(origin, direction).filter(|hit| scene.is_lit_side(hit));
-    lit.and_then(|hit| scene.surface(&hit, 0.0)).map_or(Vec3::ZERO, |y| scene.radiosity(&y))
+/// The point whose irradiance is wanted.
+struct Receiver<'a> {
+    point: &'a SurfacePoint,
+    /// Just in front of the surface.
+    origin: Vec3,
+    /// With the shading normal, an orthonormal frame.
+    tangents: (Vec3, Vec3),
+}
+
+/// Estimate from one direction: reflected light of what it meets, and its share of emitted light.
+fn by_direction(scene: &TraceScene<'_>, receiver: &Receiver<'_>, random: (f32, f32)) -> Vec3 {
+    let local = cosine_direction(random);
+    let (tangent, bitangent) = receiver.tangents;
+    let direction = tangent * local.x + bitangent * local.y + receiver.point.normal * local.z;
+    if direction.dot(receiver.point.geometric_normal) <= 0.0 {
+        return Vec3::ZERO;
+    }
+    let lit = scene.path_hit(receiver.origin, direction).filter(|hit| scene.is_lit_side(hit));
+    let Some((hit, y)) = lit.and_then(|hit| Some((hit, scene.surface(&hit, 0.0)?))) else {
+        return Vec3::ZERO;
+    };
+    let mut radiosity = scene.reflected(&y);
+    if y.emission != Vec3::ZERO {
+        let by_direction = local.z / PI;
+        let by_emitter = emitter_density(scene, &y, direction, hit.distance);
+        radiosity += PI * y.emission * (by_direction / (by_direction + by_emitter));
+    }
+    radiosity
+}
+
+/// Estimate of emitted light from one point of an emitter; with [`by_direction`]'s share it makes the whole (balance
+/// heuristic, Veach 1997, section 9.2), which neither small emitters nor those close by make noisy.
+fn by_emitter(scene: &TraceScene<'_>, receiver: &Receiver<'_>, random: (f32, f32)) -> Vec3 {
+    let Some(target) = scene.emitters.draw(random) else { return Vec3::ZERO };
+    let Some(direction) = (target.position - receiver.origin).try_normalize() else { return Vec3::ZERO };
+    let cosine = receiver.point.normal.dot(direction);
+    if cosine <= 0.0 || receiver.point.geometric_normal.dot(direction) <= 0.0 {
+        return Vec3::ZERO;
+    }
+    // The nearest hit, not a test for blockers: of two coincident triangles, directions too see only one.
+    let hit = scene.path_hit(receiver.origin, direction);
+    let seen = hit.filter(|hit| hit.triangle == target.triangle && scene.is_lit_side(hit));
+    let Some((hit, y)) = seen.and_then(|hit| Some((hit, scene.surface(&hit, 0.0)?))) else {
+        return Vec3::ZERO;
+    };
+    let by_emitter = emitter_density(scene, &y, direction, hit.distance);
+    y.emission * (cosine / (by_emitter + cosine / PI))
+}
+
+/// Density per solid angle with which [`by_emitter`] finds the direction in which `y` lies.
+fn emitter_density(scene: &TraceScene<'_>, y: &SurfacePoint, direction: Vec3, distance: f32) -> f32 {
+    let cosine = -y.geometric_normal.dot(direction);
+    if cosine <= 0.0 { 0.0 } else { scene.emitters.density(y.triangle) * distance * distance / cosine }
 }
 
 /// The `i`-th of `count` points of the unit square (Hammersley 1960): stratified in both coordinates at every scale,

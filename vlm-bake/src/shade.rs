@@ -1,11 +1,10 @@
 //! A scene ready for rays: what they meet, what colour it has there, and the direct light on it.
 
-use std::f32::consts::PI;
-
 use glam::Vec3;
 use vlm_shaders::cpu::punctual;
 
 use crate::bvh::{Bvh, Hit};
+use crate::emitters::Emitters;
 use crate::scene::{self, PunctualKind, Scene};
 
 /// What rays must know of a scene, indexed by triangle, with the tree over its triangles.
@@ -14,6 +13,8 @@ pub struct TraceScene<'a> {
     pub scene: &'a Scene,
     /// The tree over [`Scene::triangles`].
     pub bvh: Bvh,
+    /// The emissive triangles.
+    pub emitters: Emitters,
     /// The punctual lights; the default light in a scene where nothing shines.
     pub lights: Vec<punctual::PunctualLight>,
     sides: Vec<Sides>,
@@ -59,7 +60,7 @@ impl<'a> TraceScene<'a> {
         let sides = scene.triangle_primitive.iter().map(|&primitive| sides_of(scene, primitive)).collect();
         let lights = scene.lights_or_default().iter().map(punctual_light).collect();
         let bvh = Bvh::new(&scene.positions, &scene.triangles);
-        Self { scene, bvh, lights, sides, masked: Vec::new() }
+        Self { scene, bvh, emitters: Emitters::new(scene), lights, sides, masked: Vec::new() }
     }
 
     /// The same, with holes where alphaMode MASK cuts them; [`TraceScene::new`] takes masked surfaces as solid. Every
@@ -137,14 +138,13 @@ impl<'a> TraceScene<'a> {
         self.lights.iter().filter_map(arriving).sum()
     }
 
-    /// Radiosity of a surface point by direct light and its own emission, lx: `albedo * E + pi * L_e`.
+    /// Radiosity of a surface point by direct light alone, lx: `albedo * E`.
     #[must_use]
-    pub fn radiosity(&self, point: &SurfacePoint) -> Vec3 {
-        let emitted = point.emission * PI;
+    pub fn reflected(&self, point: &SurfacePoint) -> Vec3 {
         if point.albedo == Vec3::ZERO {
-            return emitted;
+            return Vec3::ZERO;
         }
-        point.albedo * self.direct_irradiance(point.position, point.normal, point.geometric_normal) + emitted
+        point.albedo * self.direct_irradiance(point.position, point.normal, point.geometric_normal)
     }
 
     fn is_occluded(&self, origin: Vec3, direction: Vec3, max_distance: f32) -> bool {

@@ -10,13 +10,17 @@ pub fn luminance(color: Vec3) -> f32 {
 
 /// The exposure that maps the log-average luminance to middle grey, 0.18 (Reinhard et al. 2002, equation 1).
 ///
-/// Black pixels are left out instead of being weighed by a small constant, so that the share of background does not
-/// change a picture's brightness. 1 where all is black.
+/// Black pixels are left out, so that the share of background does not change a picture's brightness; what is darker
+/// than 5 % of the mean counts as that, so that deep shadows do not wash out the lit parts. 1 where all is black.
 #[must_use]
-pub fn auto_exposure(radiance: impl IntoIterator<Item = Vec3>) -> f32 {
-    let lit = radiance.into_iter().map(luminance).filter(|l| *l > 0.0 && l.is_finite());
-    let (sum, count) = lit.fold((0.0, 0_u64), |(sum, count), l| (sum + f64::from(l).ln(), count + 1));
-    if count == 0 { 1.0 } else { (0.18 / (sum / count as f64).exp()) as f32 }
+pub fn auto_exposure(radiance: &[Vec3]) -> f32 {
+    let lit = || radiance.iter().map(|&r| f64::from(luminance(r))).filter(|l| *l > 0.0 && l.is_finite());
+    let count = lit().count() as f64;
+    if count == 0.0 {
+        return 1.0;
+    }
+    let floor = 0.05 * lit().sum::<f64>() / count;
+    (0.18 / (lit().map(|l| l.max(floor).ln()).sum::<f64>() / count).exp()) as f32
 }
 
 /// Compresses exposed radiance to 0..1: Khronos PBR Neutral tone mapper (2024), which shows base colours unchanged up
@@ -56,9 +60,15 @@ mod tests {
 
     #[test]
     fn exposure_shows_a_uniform_picture_as_middle_grey() {
-        let exposure = auto_exposure([Vec3::splat(50.0), Vec3::ZERO, Vec3::splat(50.0)]);
+        let exposure = auto_exposure(&[Vec3::splat(50.0), Vec3::ZERO, Vec3::splat(50.0)]);
         assert!((exposure * 50.0 - 0.18).abs() < 1e-5);
-        assert_eq!(auto_exposure([Vec3::ZERO]), 1.0);
+        assert_eq!(auto_exposure(&[Vec3::ZERO]), 1.0);
+    }
+
+    #[test]
+    fn deep_shadow_does_not_wash_out_the_rest() {
+        let exposure = auto_exposure(&[Vec3::splat(10.0), Vec3::splat(1e-6)]);
+        assert!(exposure * 10.0 < 0.18 * 7.0, "{exposure}");
     }
 
     #[test]
