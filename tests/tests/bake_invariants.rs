@@ -1,5 +1,7 @@
 //! What holds for every bake, checked anew from the asset alone: nothing here calls the code that it checks.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use glam::{DMat3, DMat4, DVec3};
 use vlm_bake::bake::{Bake, bake};
 use vlm_bake::options::{BakeOptions, Preset};

@@ -1,5 +1,7 @@
 //! The committed scenes are what their generator makes, and the README's hashes are theirs.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::path::Path;
 
 #[test]

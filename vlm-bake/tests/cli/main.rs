@@ -1,5 +1,7 @@
 //! Runs the program `vlm` as users and scripts do.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 mod support;
 mod bad_input;
 mod baking;

@@ -90,6 +90,7 @@ impl Builder {
         self.material(json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }))
     }
 
+    #[expect(clippy::needless_pass_by_value, reason = "callers hand over literals")]
     fn material(&mut self, material: Value) -> &mut Value {
         self.primitive()["material"] = json!(0);
         self.json["materials"] = json!([material]);
