@@ -70,7 +70,7 @@ pub fn print(lines: &[impl Display]) -> Result<(), CliError> {
 /// Prints a report as JSON.
 ///
 /// # Errors
-/// As [`print`].
+/// As [`print()`].
 pub fn print_json(report: &impl serde::Serialize) -> Result<(), CliError> {
     let json = serde_json::to_string_pretty(report);
     print(&[json.map_err(|error| CliError::usage(format!("the report cannot be JSON: {error}")))?])
