@@ -3,3 +3,4 @@
 pub mod glb;
 pub mod cornell;
 pub mod assets;
+pub mod form_factor;

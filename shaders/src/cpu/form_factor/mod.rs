@@ -1,0 +1,68 @@
+//! The form factor of a triangular light at a point, in single precision.
+//!
+//! After Baum, Rushmeier, Winget, "Improving radiosity solutions through the use of analytically determined
+//! form-factors", 1989, equation 3, summed in differences so that f32 suffices; `docs/form-factor.md` has the measurements.
+//!
+//! Within about `1e-5 r` of the light's plane, `r` the distance to it, F jumps between 0 and its value in front.
+
+mod arithmetic;
+mod light;
+mod far;
+mod near;
+
+use std::f32::consts::{FRAC_1_PI, TAU};
+
+use glam::Vec3;
+
+pub use light::LightGeometry;
+
+use arithmetic::{dot, mul_add};
+use far::far_triangle;
+use near::{clip_at_horizon, polygon_sum};
+
+/// The form factor of `light` at the point `x` with unit normal `n`, 0 to 1: irradiance per radiosity.
+///
+/// 0 behind the light's plane and below the horizon. A normal of another length scales the result, which stays within
+/// 0 to 1. NaN in any input gives 0.
+#[must_use]
+pub fn form_factor(light: &LightGeometry, x: Vec3, n: Vec3) -> f32 {
+    exact::<false>(light, x, n)
+}
+
+/// [`form_factor`], with or without fused arithmetic.
+#[inline(always)]
+fn exact<const FUSED: bool>(light: &LightGeometry, x: Vec3, n: Vec3) -> f32 {
+    let r = (light.v0 - x) * light.scale;
+    let in_front = dot::<FUSED>(light.normal, r) < 0.0;
+    let heights = corner_heights::<FUSED>(light, r, n);
+    if !in_front || !heights.iter().any(|&z| z > 0.0) {
+        return 0.0;
+    }
+    let (sum, is_far) = far_triangle::<FUSED>(light, r, n);
+    if is_far && heights.iter().all(|&z| z > 0.0) {
+        return to_unit(sum * -(1.0 / TAU));
+    }
+    close::<FUSED>(light, r, n, heights)
+}
+
+/// What [`far_triangle`] cannot: lights near the point or across its horizon.
+#[inline(always)]
+fn close<const FUSED: bool>(light: &LightGeometry, r: Vec3, n: Vec3, heights: [f32; 3]) -> f32 {
+    let polygon = clip_at_horizon::<FUSED>(light, r, n, heights);
+    to_unit(polygon_sum::<FUSED>(&polygon, n, dot::<FUSED>(n, light.normal)) * -FRAC_1_PI)
+}
+
+/// Heights of the corners above the horizon, light units.
+#[inline(always)]
+fn corner_heights<const FUSED: bool>(light: &LightGeometry, r: Vec3, n: Vec3) -> [f32; 3] {
+    let z = dot::<FUSED>(n, r);
+    let rise = dot::<FUSED>(n, light.base);
+    let foot = z + dot::<FUSED>(n, light.altitude);
+    [z, mul_add::<FUSED>(-light.before, rise, foot), mul_add::<FUSED>(light.after, rise, foot)]
+}
+
+/// 0 to 1; 0 for NaN.
+#[inline(always)]
+fn to_unit(x: f32) -> f32 {
+    if x > 0.0 { if x < 1.0 { x } else { 1.0 } } else { 0.0 }
+}

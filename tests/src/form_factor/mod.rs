@@ -1,0 +1,6 @@
+//! The stress test of the form factor: cases, reference, other forms, and how far each errs.
+
+pub mod case;
+pub mod generate;
+pub mod reference;
+pub mod bins;
