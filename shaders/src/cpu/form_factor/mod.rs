@@ -16,9 +16,9 @@ use glam::Vec3;
 
 pub use light::LightGeometry;
 
-use arithmetic::{dot, mul_add};
+use arithmetic::dot;
 use far::far_triangle;
-use near::{clip_at_horizon, polygon_sum};
+use near::{Heights, clip_at_horizon, polygon_sum};
 
 /// The form factor of `light` at the point `x` with unit normal `n`, 0 to 1: irradiance per radiosity.
 ///
@@ -33,32 +33,19 @@ pub fn form_factor(light: &LightGeometry, x: Vec3, n: Vec3) -> f32 {
 #[inline(always)]
 fn exact<const FUSED: bool>(light: &LightGeometry, x: Vec3, n: Vec3) -> f32 {
     let r = (light.v0 - x) * light.scale;
-    let in_front = dot::<FUSED>(light.normal, r) < 0.0;
-    let heights = corner_heights::<FUSED>(light, r, n);
-    if !in_front || !heights.iter().any(|&z| z > 0.0) {
+    let heights = Heights::new::<FUSED>(light, r, n);
+    if !(dot::<FUSED>(light.normal, r) < 0.0 && heights.any_above()) {
         return 0.0;
     }
     let (sum, is_far) = far_triangle::<FUSED>(light, r, n);
-    if is_far && heights.iter().all(|&z| z > 0.0) {
-        return to_unit(sum * -(1.0 / TAU));
-    }
-    close::<FUSED>(light, r, n, heights)
+    if is_far && heights.all_above() { to_unit(sum * -(1.0 / TAU)) } else { close::<FUSED>(light, r, n, &heights) }
 }
 
 /// What [`far_triangle`] cannot: lights near the point or across its horizon.
 #[inline(always)]
-fn close<const FUSED: bool>(light: &LightGeometry, r: Vec3, n: Vec3, heights: [f32; 3]) -> f32 {
-    let polygon = clip_at_horizon::<FUSED>(light, r, n, heights);
+fn close<const FUSED: bool>(light: &LightGeometry, r: Vec3, n: Vec3, heights: &Heights) -> f32 {
+    let polygon = clip_at_horizon::<FUSED>(light, r, heights);
     to_unit(polygon_sum::<FUSED>(&polygon, n, dot::<FUSED>(n, light.normal)) * -FRAC_1_PI)
-}
-
-/// Heights of the corners above the horizon, light units.
-#[inline(always)]
-fn corner_heights<const FUSED: bool>(light: &LightGeometry, r: Vec3, n: Vec3) -> [f32; 3] {
-    let z = dot::<FUSED>(n, r);
-    let rise = dot::<FUSED>(n, light.base);
-    let foot = z + dot::<FUSED>(n, light.altitude);
-    [z, mul_add::<FUSED>(-light.before, rise, foot), mul_add::<FUSED>(light.after, rise, foot)]
 }
 
 /// 0 to 1; 0 for NaN.

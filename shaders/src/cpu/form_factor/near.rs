@@ -24,8 +24,48 @@ pub struct Polygon {
     pub is_quad: bool,
 }
 
-/// The part of the light above the horizon; `r` is its first corner in light units, `heights` are those of its corners,
-/// of which one at least is above 0.
+/// How the light lies to the point's horizon, light units.
+#[derive(Clone, Copy, Debug)]
+pub struct Heights {
+    /// Of the three corners.
+    pub corners: [f32; 3],
+    /// Along the three edges. Their sum is 0 to their own precision, not to that of the edges: all come from the rises
+    /// along the base and the altitude. Cuts through a nearly level light would not close otherwise.
+    pub rises: [f32; 3],
+}
+
+impl Heights {
+    /// Seen from the origin, the light's first corner at `r`.
+    #[inline(always)]
+    pub fn new<const FUSED: bool>(light: &LightGeometry, r: Vec3, n: Vec3) -> Self {
+        let first = dot::<FUSED>(n, r);
+        let along_base = dot::<FUSED>(n, light.base);
+        let along_altitude = dot::<FUSED>(n, light.altitude);
+        let to_second = mul_add::<FUSED>(-light.before, along_base, along_altitude);
+        let to_third = mul_add::<FUSED>(light.after, along_base, along_altitude);
+        Self {
+            corners: [first, first + to_second, first + to_third],
+            rises: [to_second, along_base, -to_third],
+        }
+    }
+
+    /// All corners above the horizon.
+    #[inline(always)]
+    pub fn all_above(&self) -> bool {
+        let [z0, z1, z2] = self.corners;
+        (z0 > 0.0) & (z1 > 0.0) & (z2 > 0.0)
+    }
+
+    /// At least one corner above the horizon.
+    #[inline(always)]
+    pub fn any_above(&self) -> bool {
+        let [z0, z1, z2] = self.corners;
+        (z0 > 0.0) | (z1 > 0.0) | (z2 > 0.0)
+    }
+}
+
+/// The part of the light above the horizon; `r` is its first corner in light units; one corner at least is above the
+/// horizon.
 ///
 /// Let A be the corner that is alone on its side of the horizon, and B, C the others. AB and AC cross the horizon at
 /// `A + t_b AB` and `A + t_c AC`, `t_b = z_a / (z_a - z_b)`. Above it remain
@@ -41,12 +81,11 @@ pub struct Polygon {
 pub fn clip_at_horizon<const FUSED: bool>(
     light: &LightGeometry,
     r: Vec3,
-    n: Vec3,
-    heights: [f32; 3],
+    heights: &Heights,
 ) -> Polygon {
     let [e1, e2] = light.edges();
     let e12 = light.base;
-    let above = heights.map(|z| z > 0.0);
+    let above = heights.corners.map(|z| z > 0.0);
     let all = above[0] & above[1] & above[2];
     // The shortest edge is the first or the second: as AB, it keeps the two long ones next to one another.
     let second_is_shorter = light.after < light.before;
@@ -56,12 +95,17 @@ pub fn clip_at_horizon<const FUSED: bool>(
         let other = select3(a_is_1, at_1, at_0);
         select3(a_is_2, at_2, other)
     };
-    let pick_scalar = |z: [f32; 3]| select(a_is_2, z[2], select(a_is_1, z[1], z[0]));
+    let pick_scalar = |[z0, z1, z2]: [f32; 3]| select(a_is_2, z2, select(a_is_1, z1, z0));
+    let [rise_01, rise_12, rise_20] = heights.rises;
     let (ab, bc, ca) = (pick(e1, e12, -e2), pick(e12, -e2, e1), pick(-e2, e1, e12));
     let a = pick(r, r + e1, r + e2);
     let (b, c) = (a + ab, a - ca);
-    let z_a = pick_scalar(heights);
-    let (rise_ab, rise_bc, rise_ca) = (dot::<FUSED>(n, ab), dot::<FUSED>(n, bc), dot::<FUSED>(n, ca));
+    let z_a = pick_scalar(heights.corners);
+    let (rise_ab, rise_bc, rise_ca) = (
+        pick_scalar([rise_01, rise_12, rise_20]),
+        pick_scalar([rise_12, rise_20, rise_01]),
+        pick_scalar([rise_20, rise_01, rise_12]),
+    );
 
     let a_above = z_a > 0.0;
     let t_b = select(all, 1.0, share_of(-z_a, rise_ab));
