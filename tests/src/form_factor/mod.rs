@@ -3,4 +3,8 @@
 pub mod case;
 pub mod generate;
 pub mod reference;
+pub mod textbook;
 pub mod bins;
+pub mod stress;
+pub mod gpu;
+pub mod command;

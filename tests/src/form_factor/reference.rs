@@ -28,18 +28,50 @@ pub struct Truth {
 /// The truth of `case`, or `None` where an input is not finite or the light has no area.
 #[must_use]
 pub fn truth(case: &Case) -> Option<Truth> {
-    let x = case.x.as_dvec3();
-    let [v0, v1, v2] = case.corners.map(|v| v.as_dvec3());
+    let view = View::new(case)?;
+    Some(truth_of(view.corners, view.edges, view.normal, case.n.as_dvec3()))
+}
+
+/// The form factors with the receiver moved by `step` metres to either side along each axis.
+#[must_use]
+pub fn truths_around(case: &Case, step: f64) -> Vec<f64> {
+    let Some(view) = View::new(case) else { return Vec::new() };
     let n = case.n.as_dvec3();
-    let scale = 1.0 / case.size();
-    let corners = [v0 - x, v1 - x, v2 - x].map(|r| r * scale);
-    let (e1, e2) = ((v1 - v0) * scale, (v2 - v0) * scale);
-    let normal = e1.cross(e2);
-    let is_sound = normal.length() > 0.0 && corners.iter().all(|r| r.is_finite()) && n.is_finite();
-    if !is_sound {
-        return None;
+    let moves = [DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y, DVec3::Z, -DVec3::Z];
+    let step = step / case.size();
+    moves.map(|way| form_factor_of(view.corners.map(|r| r + way * step), view.edges, view.normal, n)).to_vec()
+}
+
+/// A case in units of the light's size, as seen from the receiver.
+struct View {
+    corners: [DVec3; 3],
+    edges: [DVec3; 3],
+    normal: DVec3,
+}
+
+impl View {
+    fn new(case: &Case) -> Option<Self> {
+        let x = case.x.as_dvec3();
+        let [v0, v1, v2] = case.corners.map(|v| v.as_dvec3());
+        let scale = 1.0 / case.size();
+        let corners = [v0 - x, v1 - x, v2 - x].map(|r| r * scale);
+        let (e1, e2) = ((v1 - v0) * scale, (v2 - v0) * scale);
+        let normal = e1.cross(e2);
+        let is_sound =
+            normal.length() > 0.0 && corners.iter().all(|r| r.is_finite()) && case.n.is_finite();
+        is_sound.then_some(Self { corners, edges: [e1, e2 - e1, -e2], normal })
     }
-    Some(truth_of(corners, [e1, e2 - e1, -e2], normal, n))
+}
+
+/// The form factor alone; `corners` relative to the receiver, `edges` from each corner to the next.
+fn form_factor_of(corners: [DVec3; 3], edges: [DVec3; 3], normal: DVec3, n: DVec3) -> f64 {
+    let heights = corners.map(|r| n.dot(r));
+    if normal.dot(corners[0]) >= 0.0 || heights.iter().all(|&z| z <= 0.0) {
+        return 0.0;
+    }
+    let parts = parts_above(corners, edges, normal, heights);
+    let sum: f64 = parts.iter().flatten().map(|part| part.sum(n)).sum();
+    (-sum / TAU).clamp(0.0, 1.0)
 }
 
 /// `corners` relative to the receiver, `edges` from each corner to the next.
@@ -51,17 +83,13 @@ pub fn truth_of(corners: [DVec3; 3], edges: [DVec3; 3], normal: DVec3, n: DVec3)
     if normal.dot(corners[0]) >= 0.0 || above == 0 {
         return Truth { crosses, ..Truth::default() };
     }
-    let mut sum = 0.0;
-    for part in parts_above(corners, edges, normal, heights).iter().flatten() {
-        sum += part.sum(n);
-    }
     let mut pieces = MOST_PIECES;
     let uncosined = uncosined_share(corners[0], edges[0], -edges[2], normal.length(), &mut pieces);
     let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
     let cosine_here = n.dot(centre) / (centre.length() * n.length());
     let cosine_there = -normal.dot(centre) / (centre.length() * normal.length());
     Truth {
-        form_factor: (-sum / TAU).clamp(0.0, 1.0),
+        form_factor: form_factor_of(corners, edges, normal, n),
         uncosined: uncosined.min(PI) / PI * n.length(),
         crosses,
         is_well_seen: above == 3 && cosine_here > 0.1 && cosine_there > 0.1,

@@ -5,8 +5,12 @@ use glam::Vec3;
 use super::arithmetic::{along, arctangent_excess, cross, dot, mul_add};
 use super::light::LightGeometry;
 
+/// Least product of two corners' distances, light units: a receiver that nearly touches a corner may see all edges under
+/// small angles, but there `1 / r^2` differs too much from corner to corner for its differences to be small.
+const CLOSEST: f32 = 0.1;
+
 /// `-2 pi F` of the unclipped triangle as seen from the origin, its first corner at `r` (light units), and whether all
-/// its edges are seen under at most 45 degrees; if not, the sum is worth nothing.
+/// its edges are seen under at most 45 degrees and none of its corners is close; if not, the sum is worth nothing.
 ///
 /// Lambert's sum over the edges is `S = sum_ij w_ij n . (r_i x r_j)` with `w_ij = Theta_ij / |r_i x r_j|`. The first
 /// corner is `r`, the others `r + h - p a` and `r + h + q a` with base `a`, altitude `h` and `p + q = 1`. With `A = r x a`,
@@ -60,6 +64,6 @@ pub fn far_triangle<const FUSED: bool>(light: &LightGeometry, r: Vec3, n: Vec3) 
 
     let tail = mul_add::<FUSED>(dot::<FUSED>(n, r_altitude), first, dot::<FUSED>(n, r_base) * second);
     let sum = mul_add::<FUSED>(dot::<FUSED>(n, normal), i12 + g12, tail);
-    let is_far = (d01 > 0.0) & (d12 > 0.0) & (d20 > 0.0) & (t01 <= 1.0) & (t12 <= 1.0) & (t20 <= 1.0);
+    let is_far = (d01 > CLOSEST) & (d12 > CLOSEST) & (d20 > CLOSEST) & (t01 <= 1.0) & (t12 <= 1.0) & (t20 <= 1.0);
     (sum, is_far)
 }

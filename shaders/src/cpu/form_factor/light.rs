@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-/// A one-sided triangular light, 64 bytes, laid out as the GPU reads it.
+/// A one-sided triangular light, 96 bytes, laid out as the GPU reads it; the first 64 serve nearly all receivers.
 ///
 /// Seen from its first corner, which lies opposite the longest edge `base`, the triangle is an altitude and the two parts
 /// into which its foot cuts that edge: the other corners are `v0 + altitude - before base` and
@@ -30,6 +30,15 @@ pub struct LightGeometry {
     pub normal: Vec3,
     /// `altitude . altitude`.
     pub altitude_squared: f32,
+    /// Second corner, metres, world space. Receivers that nearly touch a corner need it as it is: a sum of edges would be
+    /// rounded to the first corner's distance.
+    pub v1: Vec3,
+    /// Not used.
+    pub padding_1: f32,
+    /// Third corner, metres, world space.
+    pub v2: Vec3,
+    /// Not used.
+    pub padding_2: f32,
 }
 
 impl LightGeometry {
@@ -58,6 +67,10 @@ impl LightGeometry {
             after: after as f32,
             normal: e1.cross(e2).as_vec3(),
             altitude_squared: altitude.length_squared() as f32,
+            v1: v1.as_vec3(),
+            padding_1: 0.0,
+            v2: v2.as_vec3(),
+            padding_2: 0.0,
         }
     }
 
@@ -71,9 +84,7 @@ impl LightGeometry {
     /// The corners, metres, counter-clockwise seen from the emitting side.
     #[must_use]
     pub fn corners(&self) -> [Vec3; 3] {
-        let [e1, e2] = self.edges();
-        let metres = self.metres();
-        [self.v0, self.v0 + e1 * metres, self.v0 + e2 * metres]
+        [self.v0, self.v1, self.v2]
     }
 
     /// Square metres.

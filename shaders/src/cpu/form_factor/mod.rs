@@ -9,11 +9,13 @@ mod arithmetic;
 mod light;
 mod far;
 mod near;
+mod lanes;
 
 use std::f32::consts::{FRAC_1_PI, TAU};
 
 use glam::Vec3;
 
+pub use lanes::{Receivers, form_factors, form_factors_portable};
 pub use light::LightGeometry;
 
 use arithmetic::dot;
@@ -38,13 +40,19 @@ fn exact<const FUSED: bool>(light: &LightGeometry, x: Vec3, n: Vec3) -> f32 {
         return 0.0;
     }
     let (sum, is_far) = far_triangle::<FUSED>(light, r, n);
-    if is_far && heights.all_above() { to_unit(sum * -(1.0 / TAU)) } else { close::<FUSED>(light, r, n, &heights) }
+    if is_far && heights.all_above() { far_form_factor(sum) } else { close::<FUSED>(light, x, n, &heights) }
+}
+
+#[inline(always)]
+fn far_form_factor(sum: f32) -> f32 {
+    to_unit(sum * -(1.0 / TAU))
 }
 
 /// What [`far_triangle`] cannot: lights near the point or across its horizon.
 #[inline(always)]
-fn close<const FUSED: bool>(light: &LightGeometry, r: Vec3, n: Vec3, heights: &Heights) -> f32 {
-    let polygon = clip_at_horizon::<FUSED>(light, r, heights);
+fn close<const FUSED: bool>(light: &LightGeometry, x: Vec3, n: Vec3, heights: &Heights) -> f32 {
+    let corners = light.corners().map(|v| (v - x) * light.scale);
+    let polygon = clip_at_horizon::<FUSED>(light, corners, heights);
     to_unit(polygon_sum::<FUSED>(&polygon, n, dot::<FUSED>(n, light.normal)) * -FRAC_1_PI)
 }
 

@@ -10,6 +10,11 @@ use super::light::LightGeometry;
 /// Keeps quotients finite where a corner or an edge meets the point; far below anything that f32 resolves there.
 const TINY: f32 = 1e-30;
 
+/// Least distance of a corner, light units, for the sum by differences: closer, `1 / r^2` differs so much from corner to
+/// corner that the differences are no smaller than what they come from. More leaves thin lights to the plain sum's
+/// cancellation.
+const NEAREST_BY_DIFFERENCES: f32 = 0.25;
+
 /// Up to four corners as seen from the point, and the edges between them: exact to their own length, not to that of
 /// the corners.
 #[derive(Clone, Copy, Debug)]
@@ -64,7 +69,7 @@ impl Heights {
     }
 }
 
-/// The part of the light above the horizon; `r` is its first corner in light units; one corner at least is above the
+/// The part of the light above the horizon; `r` are its corners in light units, of which one at least is above the
 /// horizon.
 ///
 /// Let A be the corner that is alone on its side of the horizon, and B, C the others. AB and AC cross the horizon at
@@ -80,7 +85,7 @@ impl Heights {
 #[inline(always)]
 pub fn clip_at_horizon<const FUSED: bool>(
     light: &LightGeometry,
-    r: Vec3,
+    [r0, r1, r2]: [Vec3; 3],
     heights: &Heights,
 ) -> Polygon {
     let [e1, e2] = light.edges();
@@ -98,8 +103,7 @@ pub fn clip_at_horizon<const FUSED: bool>(
     let pick_scalar = |[z0, z1, z2]: [f32; 3]| select(a_is_2, z2, select(a_is_1, z1, z0));
     let [rise_01, rise_12, rise_20] = heights.rises;
     let (ab, bc, ca) = (pick(e1, e12, -e2), pick(e12, -e2, e1), pick(-e2, e1, e12));
-    let a = pick(r, r + e1, r + e2);
-    let (b, c) = (a + ab, a - ca);
+    let (a, b, c) = (pick(r0, r1, r2), pick(r1, r2, r0), pick(r2, r0, r1));
     let z_a = pick_scalar(heights.corners);
     let (rise_ab, rise_bc, rise_ca) = (
         pick_scalar([rise_01, rise_12, rise_20]),
@@ -212,7 +216,9 @@ pub fn polygon_sum<const FUSED: bool>(polygon: &Polygon, n: Vec3, n_normal: f32)
     for i in 1..4 {
         plain = mul_add::<FUSED>(weight[i].half, flux[i], plain);
     }
-    let all_far = weight[0].is_far & weight[1].is_far & weight[2].is_far & weight[3].is_far;
+    let nearest = length[0].min(length[1]).min(length[2]).min(length[3]);
+    let all_far = (nearest > NEAREST_BY_DIFFERENCES)
+        & weight[0].is_far & weight[1].is_far & weight[2].is_far & weight[3].is_far;
     select(all_far, sum, plain)
 }
 
