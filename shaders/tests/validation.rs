@@ -31,12 +31,24 @@ fn light_geometry_has_the_layout_of_its_mirror() {
     let module = parse(&wgsl::form_factor_cases()).unwrap_or_else(|error| panic!("{error}"));
     let (_, light) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some("LightGeometry")).unwrap();
     let naga::TypeInner::Struct { members, span } = &light.inner else { panic!("not a struct") };
-    let found: Vec<_> = members.iter().map(|m| (m.name.as_deref().unwrap_or(""), m.offset as usize)).collect();
+    let found: Vec<_> =
+        members.iter().map(|m| (m.name.as_deref().unwrap_or(""), m.offset as usize)).collect();
     macro_rules! offsets {
         ($($field:ident),*) => { [$((stringify!($field), offset_of!(LightGeometry, $field))),*] };
     }
     let expected = offsets!(
-        v0, scale, base, before, altitude, after, normal, altitude_squared, v1, padding_1, v2, padding_2
+        v0,
+        scale,
+        base,
+        before,
+        altitude,
+        after,
+        normal,
+        altitude_squared,
+        v1,
+        padding_1,
+        v2,
+        padding_2
     );
     assert_eq!(found, expected);
     assert_eq!(*span as usize, size_of::<LightGeometry>());

@@ -35,7 +35,7 @@ pub fn cornell() -> Vec<u8> {
     let lamp = json!({ "name": "lamp", "type": "point", "color": [1.0, 1.0, 1.0], "intensity": 100.0 });
     let lamp_node = json!({
         "name": "lamp",
-        "translation": [0.0, 4.8, -2.796],
+        "translation": [0.0, 4.2, -2.796],
         "extensions": { "KHR_lights_punctual": { "light": 0 } },
     });
     room_with(("short block", block(SHORT_BLOCK, 1.65)), lamp, lamp_node)
@@ -49,17 +49,18 @@ pub fn cornell_sphere() -> Vec<u8> {
         "type": "spot",
         "color": [1.0, 1.0, 1.0],
         "intensity": 400.0,
-        "spot": { "innerConeAngle": 0.35, "outerConeAngle": 0.6 },
+        "spot": { "innerConeAngle": 0.35, "outerConeAngle": 0.5 },
     });
     let position = [2.5, 5.2, -5.3];
-    let centre = [0.9, 0.9, -1.7];
+    // Between the sphere and the middle of the floor: both are lit, and little leaves through the open front.
+    let target = [-0.7, 0.0, -2.9];
     let spot_node = json!({
         "name": "spot",
         "translation": position,
-        "rotation": rotation_to(std::array::from_fn(|k| centre[k] - position[k])),
+        "rotation": rotation_to(std::array::from_fn(|k| target[k] - position[k])),
         "extensions": { "KHR_lights_punctual": { "light": 0 } },
     });
-    room_with(("sphere", sphere(centre, 0.9, 4)), spot, spot_node)
+    room_with(("sphere", sphere([0.9, 0.9, -1.7], 0.9, 4)), spot, spot_node)
 }
 
 fn room_with((name, object): (&str, Mesh), light: Value, light_node: Value) -> Vec<u8> {
@@ -226,5 +227,7 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
 }
 
 fn determinant(a: [f32; 3], b: [f32; 3], c: [f32; 3]) -> f32 {
-    a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+    a[0] * (b[1] * c[2] - b[2] * c[1])
+        + a[1] * (b[2] * c[0] - b[0] * c[2])
+        + a[2] * (b[0] * c[1] - b[1] * c[0])
 }

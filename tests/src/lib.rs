@@ -1,6 +1,10 @@
 //! Metrics, comparison methods and benchmarks.
 
+pub mod assets;
 pub mod glb;
 pub mod cornell;
-pub mod assets;
+pub mod sample_asset;
+pub mod scenes;
+pub mod metrics;
+pub mod thesis;
 pub mod form_factor;

@@ -1,6 +1,6 @@
 //! Camera rays.
 
-use glam::{DMat4, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
 use crate::scene::{Camera, Projection, Scene};
 
@@ -70,34 +70,39 @@ impl CameraRays {
     }
 }
 
-/// A camera that sees the whole scene from its front, a little from above: for files that bring none.
-#[must_use]
-pub fn framing_camera(scene: &Scene) -> Camera {
-    const VERTICAL_ANGLE: f64 = 0.8;
-    let finite = scene.positions.iter().filter(|p| p.is_finite()).map(|p| p.as_dvec3());
-    let (low, high) = finite.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
-    let (low, high) = if low.x <= high.x { (low, high) } else { (DVec3::NEG_ONE, DVec3::ONE) };
-    let centre = 0.5 * (low + high);
-    let radius = (0.5 * (high - low).length()).max(1e-3);
-    let away = DVec3::new(0.35, 0.35, 1.0).normalize_or_zero();
-    let eye = centre + away * (radius / (0.5 * VERTICAL_ANGLE).sin());
-    Camera {
-        name: "framing camera".to_owned(),
-        world_from_view: looking_from(eye, away),
-        projection: Projection::Perspective(VERTICAL_ANGLE as f32),
-    }
+/// There is no such camera.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is no camera `{wanted}`: name one of {available}, or give its number from 0")]
+pub struct UnknownCamera {
+    wanted: String,
+    available: String,
 }
 
-/// A view at `eye` whose z axis, away from what it looks at, is the unit vector `back` (not straight up or down).
-fn looking_from(eye: DVec3, back: DVec3) -> DMat4 {
-    let right = DVec3::Y.cross(back).normalize_or_zero();
-    let up = back.cross(right);
-    DMat4::from_cols(right.extend(0.0), up.extend(0.0), back.extend(0.0), eye.extend(1.0))
+impl Scene {
+    /// A camera by its name, else by its number; the first one if none is wanted.
+    ///
+    /// # Errors
+    /// [`UnknownCamera`] lists those that there are.
+    pub fn camera(&self, wanted: Option<&str>) -> Result<Camera, UnknownCamera> {
+        let cameras = self.cameras_or_default();
+        let by_name = |name: &str| cameras.iter().find(|camera| camera.name == name);
+        let by_number = |number: &str| number.parse::<usize>().ok().and_then(|number| cameras.get(number));
+        let found = match wanted {
+            None => cameras.first(),
+            Some(wanted) => by_name(wanted).or_else(|| by_number(wanted)),
+        };
+        found.cloned().ok_or_else(|| {
+            let names: Vec<String> = cameras.iter().map(|camera| format!("`{}`", camera.name)).collect();
+            let wanted = wanted.unwrap_or_default().to_owned();
+            UnknownCamera { wanted, available: names.join(", ") }
+        })
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DMat4;
 
     fn camera(projection: Projection) -> Camera {
         let world_from_view = DMat4::from_translation(DVec3::new(0.0, 0.0, 5.0));
@@ -126,16 +131,15 @@ mod tests {
     }
 
     #[test]
-    fn framing_camera_sees_every_corner() {
-        let positions =
-            (0..8).map(|i| Vec3::new((i & 1) as f32 * 9.0, (i & 2) as f32, (i & 4) as f32)).collect();
-        let scene = Scene { positions, ..Scene::default() };
-        let camera = framing_camera(&scene);
-        let view_from_world = camera.world_from_view.inverse();
-        let Projection::Perspective(angle) = camera.projection else { panic!() };
-        for p in &scene.positions {
-            let p = view_from_world.transform_point3(p.as_dvec3());
-            assert!(p.z < 0.0 && p.x.abs().max(p.y.abs()) <= -p.z * f64::from(0.5 * angle).tan());
-        }
+    fn cameras_are_found_by_name_then_number() {
+        let named = |name: &str| Camera { name: name.to_owned(), ..camera(Projection::Orthographic(1.0)) };
+        let scene = Scene { cameras: vec![named("nave"), named("0"), named("court")], ..Scene::default() };
+        let found = |wanted: &str| scene.camera(Some(wanted)).map(|camera| camera.name);
+        assert_eq!(found("court").unwrap(), "court");
+        assert_eq!(found("2").unwrap(), "court");
+        assert_eq!(found("0").unwrap(), "0", "names come first");
+        assert_eq!(scene.camera(None).unwrap().name, "nave");
+        let message = found("roof").unwrap_err().to_string();
+        assert!(message.contains("roof") && message.contains("`nave`"), "{message}");
     }
 }

@@ -1,11 +1,33 @@
-//! Bakes Virtual Light Meshes from glTF.
+//! Bakes Virtual Light Meshes from glTF, and renders them on the CPU.
 //!
-//! Stages, in the order in which data flows:
-//! `scene -> patches -> decimate -> offset -> refine -> verify -> tag -> samples -> grid -> write`.
+//! Stages of the bake, in the order in which data flows:
+//! `scene -> patches -> decimate -> offset -> verify -> tag -> refine -> samples -> authored -> grid -> write`.
 //! For pictures on the CPU: `scene, bvh -> camera -> shade -> gbuffer -> reference | render -> picture`.
 
+pub mod options;
+pub mod progress;
+pub mod report;
+
+pub mod bake;
 pub mod scene;
+pub mod patches;
+pub mod decimate;
+pub mod planar;
+pub mod surface;
+pub mod clearance;
+pub mod signed_distance;
+pub mod offset;
+pub mod verify;
+pub mod tag;
+pub mod refine;
+pub mod samples;
+pub mod authored;
+pub mod grid;
+pub mod write;
+
 pub mod bvh;
+pub mod topology;
+
 pub mod camera;
 pub mod shade;
 pub mod gbuffer;

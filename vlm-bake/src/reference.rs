@@ -4,15 +4,11 @@
 //! and `L(y) = albedo / pi * E_direct(y) + L_e(y)`. With directions drawn with density `cos(theta) / pi`, the estimate
 //! is the mean of `pi L(y) = albedo * E_direct(y) + pi L_e(y)`: the mean radiosity of what the directions meet.
 
-use std::sync::atomic::{AtomicU32, Ordering};
-
 use glam::Vec3;
 use rayon::prelude::*;
 
+use crate::progress::Progress;
 use crate::shade::{SurfacePoint, TraceScene};
-
-/// Called with the number of finished rows, from any thread, in no particular order.
-pub type Progress<'a> = &'a (dyn Fn(u32) + Sync);
 
 /// One-bounce indirect irradiance, lx, of each point (row by row, `width` to a row); 0 where there is none.
 ///
@@ -24,18 +20,18 @@ pub fn indirect_irradiance(
     points: &[Option<SurfacePoint>],
     width: u32,
     samples: u32,
-    progress: Progress<'_>,
+    progress: &dyn Progress,
 ) -> Vec<Vec3> {
     let width = width.max(1) as usize;
     let mut irradiance = vec![Vec3::ZERO; points.len()];
-    let finished = AtomicU32::new(0);
+    progress.begin("trace", points.len().div_ceil(width) as u64);
     let rows = irradiance.par_chunks_mut(width).zip(points.par_chunks(width)).enumerate();
     rows.for_each(|(row, (irradiance, points))| {
         for (column, (irradiance, point)) in irradiance.iter_mut().zip(points).enumerate() {
             let pixel = (row * width + column) as u64;
             *irradiance = point.as_ref().map_or(Vec3::ZERO, |p| irradiance_at(scene, p, samples, pixel));
         }
-        progress(finished.fetch_add(1, Ordering::Relaxed) + 1);
+        progress.advance(1);
     });
     irradiance
 }

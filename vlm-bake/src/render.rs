@@ -12,9 +12,10 @@ use vlm_shaders::cpu::inject::inject;
 use vlm_shaders::cpu::upload::LightSet;
 
 use crate::gbuffer::GBuffer;
-use crate::reference::{Progress, indirect_irradiance};
+use crate::progress::Progress;
+use crate::reference::indirect_irradiance;
 use crate::scene::{Camera, Scene};
-use crate::shade::TraceScene;
+use crate::shade::{SurfacePoint, TraceScene};
 
 /// Below this many lights, looking up a cell's list costs more than the lights that it leaves out.
 const FEWEST_LIGHTS_FOR_GRID: usize = 40;
@@ -23,8 +24,7 @@ const FEWEST_LIGHTS_FOR_GRID: usize = 40;
 const MOST_PIXELS: u64 = 1 << 28;
 
 /// How the indirect light is found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
     /// No indirect light.
     Direct,
@@ -35,6 +35,19 @@ pub enum Method {
     /// The lights of each point's grid cell; every light without a grid or with few lights.
     #[default]
     Vlm,
+}
+
+impl Method {
+    /// The name that commands and reports use.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Direct => "direct",
+            Self::Reference => "reference",
+            Self::Brute => "brute",
+            Self::Vlm => "vlm",
+        }
+    }
 }
 
 /// What picture to make.
@@ -66,6 +79,22 @@ pub struct Rendering {
     /// Indirect irradiance, lx; 0 where nothing is hit.
     pub indirect: Vec<Vec3>,
     /// What it took.
+    pub stats: RenderStats,
+}
+
+/// A finished picture in numbers, as `--json` prints it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RenderReport {
+    /// The camera's name.
+    pub camera: String,
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// The method's name.
+    pub method: String,
+    /// What it took.
+    #[serde(flatten)]
     pub stats: RenderStats,
 }
 
@@ -128,7 +157,7 @@ pub fn render(
     asset: Option<&VlmAsset>,
     camera: &Camera,
     options: &RenderOptions,
-    progress: Progress<'_>,
+    progress: &dyn Progress,
 ) -> Result<Rendering, RenderError> {
     check_size(options)?;
     let trace = TraceScene::new(scene);
@@ -144,8 +173,8 @@ pub fn render(
             let seconds = PhaseSeconds { inject: 0.0, gather: start.elapsed().as_secs_f64() };
             (indirect, RenderStats { seconds, pairs_evaluated: 0, lights })
         }
-        Method::Brute => gather_brute(&trace, asset.ok_or(RenderError::NoLights)?, &gbuffer)?,
-        Method::Vlm => gather_by_grid(&trace, asset.ok_or(RenderError::NoLights)?, &gbuffer)?,
+        Method::Brute => gather_brute(&trace, asset.ok_or(RenderError::NoLights)?, &gbuffer, progress)?,
+        Method::Vlm => gather_by_grid(&trace, asset.ok_or(RenderError::NoLights)?, &gbuffer, progress)?,
     };
     Ok(Rendering { gbuffer, direct, indirect, stats })
 }
@@ -160,22 +189,24 @@ fn gather_brute(
     trace: &TraceScene<'_>,
     asset: &VlmAsset,
     gbuffer: &GBuffer,
+    progress: &dyn Progress,
 ) -> Result<(Vec<Vec3>, RenderStats), RenderError> {
     let lit = LitScene::new(trace, asset)?;
     let all = 0..lit.lights.len() as u32;
-    Ok(lit.gather(gbuffer, |receiver| gather(&lit.lights, &lit.radiosity, all.clone(), receiver)))
+    Ok(lit.gather(gbuffer, progress, |receiver| gather(&lit.lights, &lit.radiosity, all.clone(), receiver)))
 }
 
 fn gather_by_grid(
     trace: &TraceScene<'_>,
     asset: &VlmAsset,
     gbuffer: &GBuffer,
+    progress: &dyn Progress,
 ) -> Result<(Vec<Vec3>, RenderStats), RenderError> {
     let Some(grid) = asset.grid.as_ref().filter(|_| asset.triangles.len() >= FEWEST_LIGHTS_FOR_GRID) else {
-        return gather_brute(trace, asset, gbuffer);
+        return gather_brute(trace, asset, gbuffer, progress);
     };
     let lit = LitScene::new(trace, asset)?;
-    Ok(lit.gather(gbuffer, |receiver| {
+    Ok(lit.gather(gbuffer, progress, |receiver| {
         let list = lights_at(grid, receiver.position).iter().copied();
         gather(&lit.lights, &lit.radiosity, list, receiver)
     }))
@@ -212,23 +243,33 @@ impl<'a> LitScene<'a> {
     pub fn gather(
         &self,
         gbuffer: &GBuffer,
+        progress: &dyn Progress,
         gather: impl Fn(&Receiver) -> Gathered + Sync,
     ) -> (Vec<Vec3>, RenderStats) {
         let start = Instant::now();
-        let gathered = gbuffer.points.par_iter().map(|point| {
-            let Some(point) = point else { return Gathered::default() };
-            gather(&Receiver {
-                position: point.position,
-                normal: point.normal,
-                geometric_normal: point.geometric_normal,
-                tag: self.tag(point.triangle),
-            })
+        let at = |point: &Option<SurfacePoint>| {
+            point.as_ref().map_or(Gathered::default(), |point| gather(&self.receiver(point)))
+        };
+        let rows = gbuffer.points.par_chunks(gbuffer.width.max(1) as usize);
+        progress.begin("gather", rows.len() as u64);
+        let gathered = rows.flat_map_iter(|row| {
+            progress.advance(1);
+            row.iter().map(at)
         });
         let gathered: Vec<Gathered> = gathered.collect();
         let seconds = PhaseSeconds { inject: self.inject_seconds, gather: start.elapsed().as_secs_f64() };
         let pairs_evaluated = gathered.iter().map(|g| g.pairs).sum();
         let stats = RenderStats { seconds, pairs_evaluated, lights: self.lights.len() as u32 };
         (gathered.iter().map(|g| g.irradiance).collect(), stats)
+    }
+
+    fn receiver(&self, point: &SurfacePoint) -> Receiver {
+        Receiver {
+            position: point.position,
+            normal: point.normal,
+            geometric_normal: point.geometric_normal,
+            tag: self.tag(point.triangle),
+        }
     }
 
     fn tag(&self, triangle: u32) -> u32 {

@@ -14,7 +14,7 @@ pub struct TraceScene<'a> {
     pub scene: &'a Scene,
     /// The tree over [`Scene::triangles`].
     pub bvh: Bvh,
-    /// The punctual lights.
+    /// The punctual lights; the default light in a scene where nothing shines.
     pub lights: Vec<punctual::PunctualLight>,
     sides: Vec<Sides>,
 }
@@ -52,7 +52,7 @@ impl<'a> TraceScene<'a> {
     #[must_use]
     pub fn new(scene: &'a Scene) -> Self {
         let sides = scene.triangle_primitive.iter().map(|&primitive| sides_of(scene, primitive)).collect();
-        let lights = scene.lights.iter().map(punctual_light).collect();
+        let lights = scene.lights_or_default().iter().map(punctual_light).collect();
         Self { scene, bvh: Bvh::new(&scene.positions, &scene.triangles), lights, sides }
     }
 
@@ -95,7 +95,8 @@ impl<'a> TraceScene<'a> {
         let geometric_normal = (p1 - p0).cross(p2 - p0).try_normalize()? * side;
         let normal =
             interpolate(&scene.vertex_normals).try_normalize().map_or(geometric_normal, |n| n * side);
-        let (albedo, emission) = self.colors(hit, footprint);
+        let scene::Surface { albedo, emission, .. } =
+            scene.albedo_at(hit.triangle as usize, hit.barycentric, footprint);
         let position = interpolate(&scene.positions);
         Some(SurfacePoint { triangle: hit.triangle, position, normal, geometric_normal, albedo, emission })
     }
@@ -141,15 +142,6 @@ impl<'a> TraceScene<'a> {
 
     fn sides(&self, triangle: u32) -> Sides {
         self.sides.get(triangle as usize).copied().unwrap_or(Sides::Front)
-    }
-
-    fn colors(&self, hit: &Hit, footprint: f32) -> (Vec3, Vec3) {
-        let _ = footprint;
-        let scene = self.scene;
-        let primitive = scene.triangle_primitive.get(hit.triangle as usize);
-        let primitive = primitive.and_then(|&p| scene.primitives.get(p as usize));
-        let material = primitive.and_then(|p| scene.materials.get(p.material as usize));
-        material.map_or((Vec3::ZERO, Vec3::ZERO), |m| (m.base_color, m.emission))
     }
 }
 

@@ -140,7 +140,7 @@ impl GltfFile {
         let bytes = element_bytes(json) as usize;
         let mut packed = match index(json, "bufferView") {
             Some(view) => {
-                self.gather(Run { owner: json, view, elements, bytes, may_stride: true }, &pointer)?
+                self.gather(&Run { owner: json, view, elements, bytes, may_stride: true }, &pointer)?
             }
             None => vec![0; elements * bytes],
         };
@@ -162,7 +162,7 @@ impl GltfFile {
             let owner = sparse.get(key).unwrap_or(&Value::Null);
             let view = index(owner, "bufferView").unwrap_or(usize::MAX);
             self.gather(
-                Run { owner, view, elements, bytes, may_stride: false },
+                &Run { owner, view, elements, bytes, may_stride: false },
                 &format!("{pointer}/sparse/{key}"),
             )
         };
@@ -182,8 +182,8 @@ impl GltfFile {
     }
 
     /// Copies elements out of a buffer view, without the gaps between them.
-    fn gather(&self, run: Run<'_>, pointer: &str) -> Result<Vec<u8>, Issue> {
-        let Run { owner, view, elements, bytes, may_stride } = run;
+    fn gather(&self, run: &Run<'_>, pointer: &str) -> Result<Vec<u8>, Issue> {
+        let Run { owner, view, elements, bytes, may_stride } = *run;
         let data = self.view_bytes(view)?;
         let json = array(self.json(), "/bufferViews").get(view).unwrap_or(&Value::Null);
         let stride = may_stride.then(|| view_stride(json)).flatten().map_or(bytes, |stride| stride as usize);

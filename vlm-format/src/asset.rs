@@ -84,7 +84,7 @@ pub struct Grid {
 
 /// The options of a bake, kept in the file so that a rebake can repeat them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "camelCase")]
+#[serde(rename_all = "camelCase", default)]
 pub struct Settings {
     /// `draft`, `game` or `quality`.
     pub preset: String,

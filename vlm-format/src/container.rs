@@ -29,8 +29,13 @@ pub struct GltfFile {
     name: String,
     folder: Option<PathBuf>,
     kind: Kind,
+    /// What each level of the JSON is indented by; `None` for JSON on one line.
+    indent: Option<String>,
     json: Value,
     document: gltf::Document,
+    /// The BIN chunk: buffer 0, if that has no URI.
+    bin: Option<Vec<u8>>,
+    /// One per buffer; empty for the one that is the BIN chunk.
     buffers: Vec<Vec<u8>>,
     /// Chunks of the GLB beyond JSON and BIN.
     other_chunks: Vec<(u32, Vec<u8>)>,
@@ -58,26 +63,25 @@ impl GltfFile {
     pub fn from_slice(bytes: &[u8], name: &str, folder: Option<&Path>) -> Result<Self, Error> {
         let refuse = |issue: Issue| issue.in_file(name);
         let packed = unpack(bytes).map_err(refuse)?;
-        let mut json = check::check_json(&packed.json);
-        if json.has_errors() {
-            return Err(Error::Invalid { file: name.to_owned(), issues: json.into_issues() });
-        }
-        let buffers = load_buffers(&packed.json, packed.bin, folder).map_err(refuse)?;
-        layout::check(&packed.json, &usable_bytes(&packed.json, &buffers), &mut json);
-        if json.has_errors() {
-            return Err(Error::Invalid { file: name.to_owned(), issues: json.into_issues() });
-        }
+        let mut report = check::check_json(&packed.json);
+        report.refuse(name)?;
+        let buffers = load_buffers(&packed.json, folder).map_err(refuse)?;
+        let sizes = usable_bytes(&packed.json, packed.bin, &buffers).map_err(refuse)?;
+        layout::check(&packed.json, &sizes, &mut report);
+        report.refuse(name)?;
         let document = typed::document(&packed.json).map_err(refuse)?;
         Ok(Self {
             name: name.to_owned(),
             folder: folder.map(Path::to_owned),
             kind: packed.kind,
+            indent: packed.indent,
             document,
+            bin: packed.bin.map(<[u8]>::to_vec),
             buffers,
             other_chunks: packed.others,
             decoded: array(&packed.json, "/bufferViews").iter().map(|_| OnceLock::new()).collect(),
             json: packed.json,
-            warnings: json.into_issues(),
+            warnings: report.into_issues(),
         })
     }
 
@@ -168,7 +172,33 @@ impl GltfFile {
     fn range(&self, json: &Value) -> Option<&[u8]> {
         let start = usize::try_from(count(json, "byteOffset").unwrap_or_default()).ok()?;
         let length = usize::try_from(count(json, "byteLength")?).ok()?;
-        self.buffers.get(index(json, "buffer")?)?.get(start..start.checked_add(length)?)
+        self.buffer(index(json, "buffer")?)?.get(start..start.checked_add(length)?)
+    }
+
+    /// The data of a buffer, padding included.
+    pub(crate) fn buffer(&self, buffer: usize) -> Option<&[u8]> {
+        let has_uri = array(&self.json, "/buffers").get(buffer)?.get("uri").is_some();
+        if buffer == 0 && !has_uri { self.bin() } else { self.buffers.get(buffer).map(Vec::as_slice) }
+    }
+
+    /// The data of the BIN chunk, padding included.
+    pub(crate) fn bin(&self) -> Option<&[u8]> {
+        self.bin.as_deref()
+    }
+
+    /// Chunks of the GLB beyond JSON and BIN.
+    pub(crate) fn other_chunks(&self) -> &[(u32, Vec<u8>)] {
+        &self.other_chunks
+    }
+
+    /// What each level of the JSON is indented by; `None` for JSON on one line.
+    pub(crate) fn indent(&self) -> Option<&str> {
+        self.indent.as_deref()
+    }
+
+    /// Where files beside this one lie.
+    pub(crate) fn folder(&self) -> Option<&Path> {
+        self.folder.as_deref()
     }
 }
 
@@ -179,6 +209,7 @@ fn cut_off(pointer: String) -> Issue {
 /// The parts of a file, before any check.
 struct Unpacked<'a> {
     kind: Kind,
+    indent: Option<String>,
     json: Value,
     bin: Option<&'a [u8]>,
     others: Vec<(u32, Vec<u8>)>,
@@ -188,13 +219,33 @@ fn unpack(bytes: &[u8]) -> Result<Unpacked<'_>, Issue> {
     if glb::is_glb(bytes) {
         let glb = glb::parse(bytes)?;
         let others = glb.others.into_iter().map(|(kind, data)| (kind, data.to_vec())).collect();
-        return Ok(Unpacked { kind: Kind::Glb, json: parse_json(glb.json)?, bin: glb.bin, others });
+        return Ok(Unpacked {
+            kind: Kind::Glb,
+            json: parse_json(glb.json)?,
+            bin: glb.bin,
+            others,
+            indent: indent(glb.json),
+        });
     }
     let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     if text.trim_ascii_start().first() != Some(&b'{') {
         return Err(Issue::error(Code::NotGltf, "", "the file is neither GLB nor JSON"));
     }
-    Ok(Unpacked { kind: Kind::Gltf, json: parse_json(text)?, bin: None, others: Vec::new() })
+    Ok(Unpacked {
+        kind: Kind::Gltf,
+        json: parse_json(text)?,
+        bin: None,
+        others: Vec::new(),
+        indent: indent(text),
+    })
+}
+
+/// The white space before the first key, if that stands on a line of its own.
+fn indent(json: &[u8]) -> Option<String> {
+    let rest = json.trim_ascii_start().strip_prefix(b"{")?;
+    let blank = rest.iter().take_while(|byte| byte.is_ascii_whitespace()).count();
+    let line = rest[..blank].iter().rposition(|&byte| byte == b'\n')?;
+    std::str::from_utf8(&rest[line + 1..blank]).ok().map(str::to_owned)
 }
 
 fn parse_json(bytes: &[u8]) -> Result<Value, Issue> {
@@ -204,23 +255,29 @@ fn parse_json(bytes: &[u8]) -> Result<Value, Issue> {
         .map_err(|error| Issue::error(Code::JsonSyntax, "", format!("the JSON cannot be parsed: {error}")))
 }
 
-fn load_buffers(json: &Value, bin: Option<&[u8]>, folder: Option<&Path>) -> Result<Vec<Vec<u8>>, Issue> {
-    let mut buffers = Vec::new();
-    for (i, buffer) in array(json, "/buffers").iter().enumerate() {
-        let pointer = format!("/buffers/{i}");
-        let data = match buffer.get("uri").and_then(Value::as_str) {
-            Some(uri) => uri::load(uri, folder, &format!("{pointer}/uri"))?,
-            None if i == 0 => bin.unwrap_or_default().to_vec(),
-            None => Vec::new(),
-        };
+/// The data of all buffers but the BIN chunk.
+fn load_buffers(json: &Value, folder: Option<&Path>) -> Result<Vec<Vec<u8>>, Issue> {
+    let load = |(i, buffer): (usize, &Value)| match buffer.get("uri").and_then(Value::as_str) {
+        Some(uri) => uri::load(uri, folder, &format!("/buffers/{i}/uri")),
+        None => Ok(Vec::new()),
+    };
+    array(json, "/buffers").iter().enumerate().map(load).collect()
+}
+
+/// How many bytes of each buffer may be referred to: all that it promises, which must be there.
+fn usable_bytes(json: &Value, bin: Option<&[u8]>, buffers: &[Vec<u8>]) -> Result<Vec<u64>, Issue> {
+    let mut usable = Vec::new();
+    for (i, (buffer, data)) in array(json, "/buffers").iter().zip(buffers).enumerate() {
+        let is_bin = i == 0 && buffer.get("uri").is_none();
+        let available = if is_bin { bin.map_or(0, <[u8]>::len) } else { data.len() } as u64;
         let promised = count(buffer, "byteLength").unwrap_or_default();
-        if (data.len() as u64) < promised && !is_fallback(buffer) {
-            let message = format!("the buffer has {} bytes of the {promised} that it promises", data.len());
-            return Err(Issue::error(Code::BufferShort, pointer, message));
+        if available < promised && !is_fallback(buffer) {
+            let message = format!("the buffer has {available} bytes of the {promised} that it promises");
+            return Err(Issue::error(Code::BufferShort, format!("/buffers/{i}"), message));
         }
-        buffers.push(data);
+        usable.push(promised.min(available));
     }
-    Ok(buffers)
+    Ok(usable)
 }
 
 /// True for a buffer that stands for decompressed data and need not have any of its own.
@@ -228,11 +285,4 @@ fn is_fallback(buffer: &Value) -> bool {
     ["EXT_meshopt_compression", "KHR_meshopt_compression"]
         .into_iter()
         .any(|name| buffer.pointer(&format!("/extensions/{name}/fallback")) == Some(&Value::Bool(true)))
-}
-
-/// How many bytes of each buffer may be referred to: what it promises, as far as it is there.
-fn usable_bytes(json: &Value, buffers: &[Vec<u8>]) -> Vec<u64> {
-    let promised =
-        array(json, "/buffers").iter().map(|buffer| count(buffer, "byteLength").unwrap_or_default());
-    promised.zip(buffers).map(|(promised, data)| promised.min(data.len() as u64)).collect()
 }

@@ -37,7 +37,7 @@ pub enum Error {
         stale: Vec<Stale>,
     },
     /// The asset to be written breaks its own rules: a fault of the tool that made it.
-    #[error("the Virtual Light Mesh is not valid and was not written: {}", summary(issues))]
+    #[error("the Virtual Light Mesh is not valid: {}", summary(issues))]
     Asset {
         /// All problems found; at least one.
         issues: Vec<Issue>,
@@ -186,6 +186,16 @@ codes! {
     VertexNotFinite "VERTEX_NOT_FINITE" "recompute or delete the vertex in the modelling tool (a division by zero is the usual cause)",
     VertexIndex "VERTEX_INDEX" "export the file again: an index names a vertex that does not exist",
     Compression "COMPRESSION" "compress the file again, or decode it with `npx @gltf-transform/cli copy in.glb out.glb`",
+    FileName "FILE_NAME" "name the output .glb or .gltf",
+    TooLarge "TOO_LARGE" "write a .gltf with its data beside it, or make the file smaller: a GLB holds at most 4 GiB",
+    VlmLength "VLM_LENGTH" "bake the file again",
+    VlmRange "VLM_RANGE" "bake the file again",
+    VlmIndex "VLM_INDEX" "bake the file again",
+    VlmNumber "VLM_NUMBER" "bake the file again",
+    VlmOrder "VLM_ORDER" "bake the file again",
+    VlmId "VLM_ID" "bake the file again, as the last step after every other tool",
+    VlmAspect "VLM_ASPECT" "bake the file again, or split the triangle if you authored it",
+    VlmNode "VLM_NODE" "bake the file again, as the last step after every other tool",
     ImageMissing "IMAGE_MISSING" "give the image a uri or a bufferView",
 }
 

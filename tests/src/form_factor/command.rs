@@ -1,11 +1,11 @@
 //! `vlm-bench form-factor` and `vlm-bench kernel`.
 
-use std::path::PathBuf;
+use std::error::Error;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use glam::Vec3;
-use miette::{IntoDiagnostic as _, WrapErr as _, miette};
 use vlm_shaders::cpu::form_factor::{LightGeometry, Receivers, form_factor, form_factors};
 
 use super::case::Case;
@@ -52,34 +52,35 @@ pub struct KernelArgs {
 ///
 /// # Errors
 /// For files that cannot be read or written, broken rows and a missing GPU.
-pub fn run(args: &FormFactorArgs) -> miette::Result<()> {
+pub fn run(args: &FormFactorArgs) -> Result<(), Box<dyn Error>> {
     match (&args.cases, &args.out) {
         (Some(cases), Some(out)) => evaluate_file(cases, out, args.backend),
         _ => run_stress(args.stress.unwrap_or(10_000_000), args.backend),
     }
 }
 
-fn evaluate_file(cases: &PathBuf, out: &PathBuf, backend: Backend) -> miette::Result<()> {
-    let bytes = std::fs::read(cases).into_diagnostic().wrap_err_with(|| format!("cannot read {}", cases.display()))?;
+fn evaluate_file(cases: &Path, out: &Path, backend: Backend) -> Result<(), Box<dyn Error>> {
+    let bytes = std::fs::read(cases).map_err(|error| format!("cannot read {}: {error}", cases.display()))?;
     let row = size_of::<Case>();
     if bytes.len() % row != 0 {
         let message = "its length is not a multiple of 60 bytes: a row is 15 little-endian f32";
-        return Err(miette!("{}: {} bytes; {message}", cases.display(), bytes.len()));
+        return Err(format!("{}: {} bytes; {message}", cases.display(), bytes.len()).into());
     }
     let rows: Vec<Case> = bytes.chunks_exact(row).map(bytemuck::pod_read_unaligned).collect();
     let results = match backend {
         Backend::Cpu => on_cpu(&rows),
         Backend::Gpu => {
-            let gpu = GpuFormFactor::new().into_diagnostic()?;
+            let gpu = GpuFormFactor::new()?;
             let mut all = Vec::with_capacity(rows.len());
             for batch in rows.chunks(stress::BATCH as usize) {
-                all.extend(gpu.evaluate(batch).into_diagnostic()?);
+                all.extend(gpu.evaluate(batch)?);
             }
             all
         }
     };
     let bytes: Vec<u8> = results.iter().flat_map(|f| f.to_le_bytes()).collect();
-    std::fs::write(out, bytes).into_diagnostic().wrap_err_with(|| format!("cannot write {}", out.display()))
+    std::fs::write(out, bytes).map_err(|error| format!("cannot write {}: {error}", out.display()))?;
+    Ok(())
 }
 
 /// The kernel, one case at a time.
@@ -88,18 +89,21 @@ pub fn on_cpu(cases: &[Case]) -> Vec<f32> {
     cases.iter().map(|case| form_factor(&case.light(), case.x, case.n)).collect()
 }
 
-fn run_stress(count: u64, backend: Backend) -> miette::Result<()> {
+fn run_stress(count: u64, backend: Backend) -> Result<(), Box<dyn Error>> {
     let report = match backend {
         Backend::Cpu => stress::run(count, on_cpu),
         Backend::Gpu => {
-            let gpu = GpuFormFactor::new().into_diagnostic()?;
+            let gpu = GpuFormFactor::new()?;
             // A lost device shows as NaN, which no bin forgives.
             stress::run(count, |cases| gpu.evaluate(cases).unwrap_or_else(|_| vec![f32::NAN; cases.len()]))
         }
     };
     println!("{}", report.table());
     println!("out of range: {}; lit by NaN: {}", report.out_of_range, report.lit_by_nan);
-    if report.out_of_range > 0 { Err(miette!("results out of range, first in case {:?}", report.first_out_of_range)) } else { Ok(()) }
+    match report.first_out_of_range {
+        Some(case) => Err(format!("results out of range, the first in case {case}").into()),
+        None => Ok(()),
+    }
 }
 
 /// Runs `vlm-bench kernel`: millions of pairs per second of each form in the same, interleaved run.
@@ -119,7 +123,10 @@ pub fn run_kernel(args: &KernelArgs) {
         sink += scene.pairs().map(|(i, x, n)| form_factor(&scene.lights[i], x, n)).sum::<f32>();
         seconds[1].push(start.elapsed().as_secs_f64());
         let start = Instant::now();
-        sink += scene.pairs().map(|(i, x, n)| textbook(EdgeForm::Acos, &Case { corners: scene.triangles[i], x, n })).sum::<f32>();
+        sink += scene
+            .pairs()
+            .map(|(i, x, n)| textbook(EdgeForm::Acos, &Case { corners: scene.triangles[i], x, n }))
+            .sum::<f32>();
         seconds[2].push(start.elapsed().as_secs_f64());
     }
     let pairs = (scene.lights.len() * scene.points.len()) as f64;

@@ -40,8 +40,22 @@ pub const KINDS: [Kind; 7] = [
 const SCHEDULE: [Kind; 16] = {
     use Kind::*;
     [
-        Anywhere, HorizonAtCorner, Anywhere, HorizonAlongEdge, Anywhere, NearPlane, Anywhere, HorizonAtCorner,
-        Anywhere, HorizonAlongEdge, Anywhere, NormalLength, Anywhere, OddSize, Anywhere, Broken,
+        Anywhere,
+        HorizonAtCorner,
+        Anywhere,
+        HorizonAlongEdge,
+        Anywhere,
+        NearPlane,
+        Anywhere,
+        HorizonAtCorner,
+        Anywhere,
+        HorizonAlongEdge,
+        Anywhere,
+        NormalLength,
+        Anywhere,
+        OddSize,
+        Anywhere,
+        Broken,
     ]
 };
 

@@ -57,8 +57,7 @@ impl View {
         let corners = [v0 - x, v1 - x, v2 - x].map(|r| r * scale);
         let (e1, e2) = ((v1 - v0) * scale, (v2 - v0) * scale);
         let normal = e1.cross(e2);
-        let is_sound =
-            normal.length() > 0.0 && corners.iter().all(|r| r.is_finite()) && case.n.is_finite();
+        let is_sound = normal.length() > 0.0 && corners.iter().all(|r| r.is_finite()) && case.n.is_finite();
         is_sound.then_some(Self { corners, edges: [e1, e2 - e1, -e2], normal })
     }
 }
@@ -181,7 +180,7 @@ fn arctangent_excess(t: f64) -> f64 {
 }
 
 /// Enough for every light of aspect up to 100; a longer needle close by has its measure rounded to the coarser pieces.
-const MOST_PIECES: u32 = 1000;
+const MOST_PIECES: u32 = 300;
 
 /// `integral of dA / r^2`, by halving the longest edge until a piece is smaller than half its distance; `twice_area` of
 /// the piece.

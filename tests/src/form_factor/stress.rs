@@ -133,7 +133,8 @@ impl Report {
         }
         self.out_of_range += other.out_of_range;
         self.lit_by_nan += other.lit_by_nan;
-        self.first_out_of_range = [self.first_out_of_range, other.first_out_of_range].into_iter().flatten().min();
+        self.first_out_of_range =
+            [self.first_out_of_range, other.first_out_of_range].into_iter().flatten().min();
         self
     }
 
@@ -197,7 +198,8 @@ fn bin_of(case: &Case, truth: &Truth) -> Bin {
 /// How far the truth moves when the receiver moves by what four roundings to f32 of its distance to the farthest corner
 /// may move it: no f32 form can be expected to do better, however exact it is from there on.
 fn rounding_floor(case: &Case, truth_here: &Truth) -> f64 {
-    let farthest = case.corners.iter().map(|v| (v.as_dvec3() - case.x.as_dvec3()).length()).fold(0.0, f64::max);
+    let farthest =
+        case.corners.iter().map(|v| (v.as_dvec3() - case.x.as_dvec3()).length()).fold(0.0, f64::max);
     let step = 4.0 * 2f64.powi(-24) * farthest;
     super::reference::truths_around(case, step)
         .iter()

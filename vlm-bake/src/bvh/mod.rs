@@ -4,17 +4,20 @@
 //! Answers do not depend on the tree's shape, and so not on the number of threads that built it: ties go to the
 //! triangle of the lowest index, and the boxes are padded so that rounding never culls a hit.
 
-pub mod triangle;
+pub mod pack;
+pub mod nearest;
 
 use glam::{Vec3, Vec3A};
 use obvhs::{
     aabb::Aabb,
-    bvh2::{Bvh2, leaf_collapser::collapse, reinsertion::ReinsertionOptimizer},
+    bvh2::{Bvh2, leaf_collapser::collapse, node::Bvh2Node, reinsertion::ReinsertionOptimizer},
     fast_stack,
     faststack::FastStack,
     ploc::{PlocBuilder, PlocSearchDistance, SortPrecision},
     ray::{Ray, RayHit},
 };
+
+use pack::{LANES, ShearedRay, TrianglePack};
 
 /// Boxes grow by this share of the largest coordinate, 4 ulp: slab tests err by less.
 const BOX_PADDING: f32 = 4.0 * f32::EPSILON;
@@ -27,6 +30,8 @@ const LEAVE_SURFACE: f32 = 64.0 * f32::EPSILON;
 #[derive(Clone, Default)]
 pub struct Bvh {
     tree: Bvh2,
+    /// The triangles of each leaf, by fours: a leaf's packs are `meta1..meta1 + meta2` of its node.
+    packs: Vec<TrianglePack>,
     /// Corners of the triangles in the order of the tree's leaves.
     corners: Vec<[Vec3A; 3]>,
     /// The caller's index of each triangle, in the same order.
@@ -71,12 +76,13 @@ impl Bvh {
             .map(|c| Aabb::from_points(c))
             .map(|b| Aabb::new(b.min - padding, b.max + padding))
             .collect();
-        let tree = build_tree(&boxes);
+        let mut tree = build_tree(&boxes);
         // Queries then read the corners of a leaf without indirection.
         let slots = &tree.primitive_indices;
-        let corners = slots.iter().map(|&i| corners[i as usize]).collect();
+        let corners: Vec<[Vec3A; 3]> = slots.iter().map(|&i| corners[i as usize]).collect();
         let triangle_of_slot = slots.iter().map(|&i| triangle_of_slot[i as usize]).collect();
-        Self { tree, corners, triangle_of_slot, leave_distance: largest * LEAVE_SURFACE }
+        let packs = pack_leaves(&mut tree, &corners);
+        Self { tree, packs, corners, triangle_of_slot, leave_distance: largest * LEAVE_SURFACE }
     }
 
     /// Where a ray should start that leaves the surface at `point` (on or near a triangle) toward the side of `normal`
@@ -109,17 +115,17 @@ impl Bvh {
         accept: impl Fn(&Hit) -> bool,
     ) -> Option<Hit> {
         let ray = ray(origin, direction, max_distance)?;
+        let sheared = ShearedRay::new(origin, direction);
         let mut best: Option<Hit> = None;
         fast_stack!(u32, (96, 192), self.tree.max_depth, stack, {
             self.tree.ray_traverse_dynamic(&mut stack, ray, &mut RayHit::none(), |node, ray, _| {
-                for slot in node.first_index..node.first_index + node.prim_count {
-                    let Some(hit) = self.intersect(slot, ray) else { continue };
+                self.for_each_hit(node, &sheared, |hit| {
                     if is_nearer(&hit, best.as_ref(), max_distance) && accept(&hit) {
                         best = Some(hit);
                         // A little longer, so that a tie is not culled and the lowest index wins it.
                         ray.tmax = hit.distance * (1.0 + 8.0 * f32::EPSILON);
                     }
-                }
+                });
                 true
             });
         });
@@ -142,17 +148,14 @@ impl Bvh {
         blocks: impl Fn(&Hit) -> bool,
     ) -> bool {
         let Some(ray) = ray(origin, direction, max_distance) else { return false };
+        let sheared = ShearedRay::new(origin, direction);
         let mut occluded = false;
         fast_stack!(u32, (96, 192), self.tree.max_depth, stack, {
-            self.tree.ray_traverse_dynamic(&mut stack, ray, &mut RayHit::none(), |node, ray, _| {
-                for slot in node.first_index..node.first_index + node.prim_count {
-                    let hit = self.intersect(slot, ray);
-                    if hit.is_some_and(|hit| hit.distance < max_distance && blocks(&hit)) {
-                        occluded = true;
-                        return false;
-                    }
-                }
-                true
+            self.tree.ray_traverse_dynamic(&mut stack, ray, &mut RayHit::none(), |node, _, _| {
+                self.for_each_hit(node, &sheared, |hit| {
+                    occluded = occluded || (hit.distance < max_distance && blocks(&hit));
+                });
+                !occluded
             });
         });
         occluded
@@ -207,7 +210,7 @@ impl Bvh {
         best: &mut Option<Nearest>,
         accept: impl Fn(u32) -> bool,
     ) {
-        let point = triangle::closest_point(&self.corners[slot as usize], p);
+        let point = nearest::closest_point(&self.corners[slot as usize], p);
         let squared = p.distance_squared(point);
         let triangle = self.triangle_of_slot[slot as usize];
         let nearer =
@@ -218,14 +221,24 @@ impl Bvh {
         }
     }
 
-    fn intersect(&self, slot: u32, ray: &Ray) -> Option<Hit> {
-        let hit = triangle::intersect(&self.corners[slot as usize], ray.origin, ray.direction)?;
-        Some(Hit {
-            triangle: self.triangle_of_slot[slot as usize],
-            distance: hit.distance,
-            barycentric: hit.barycentric,
-            front: hit.front,
-        })
+    /// Calls `visit` with every hit among the triangles of a leaf.
+    #[inline]
+    fn for_each_hit(&self, leaf: &Bvh2Node, ray: &ShearedRay, mut visit: impl FnMut(Hit)) {
+        let packs = &self.packs[leaf.meta1 as usize..(leaf.meta1 + leaf.meta2) as usize];
+        for (pack, first) in packs.iter().zip((leaf.first_index as usize..).step_by(LANES)) {
+            let hits = pack.intersect(ray);
+            let mut mask = hits.mask.bitmask();
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize;
+                mask &= mask - 1;
+                visit(Hit {
+                    triangle: self.triangle_of_slot[first + lane],
+                    distance: hits.distance[lane],
+                    barycentric: hits.barycentric(lane),
+                    front: hits.determinant[lane] > 0.0,
+                });
+            }
+        }
     }
 }
 
@@ -256,10 +269,26 @@ fn build_tree(boxes: &[Aabb]) -> Bvh2 {
         2,
     );
     ReinsertionOptimizer::default().run(&mut tree, 0.02, None);
-    collapse(&mut tree, 8, 3.0);
+    collapse(&mut tree, LANES as u32, 3.0);
     // The stacks of queries must hold one entry per level; reinsertion may have made the tree deeper.
     tree.max_depth = depth(&tree) + 1;
     tree
+}
+
+/// Packs the triangles of each leaf, and notes in the leaf where its packs are.
+fn pack_leaves(tree: &mut Bvh2, corners: &[[Vec3A; 3]]) -> Vec<TrianglePack> {
+    let mut packs = Vec::with_capacity(corners.len().div_ceil(2));
+    for leaf in tree.nodes.iter_mut().filter(|node| node.is_leaf()) {
+        leaf.meta1 = packs.len() as u32;
+        let first = leaf.first_index as usize;
+        let triangles = corners.get(first..first + leaf.prim_count as usize).unwrap_or(&[]);
+        packs.extend(triangles.chunks(LANES).map(|chunk| {
+            let chunk: Vec<[Vec3; 3]> = chunk.iter().map(|t| t.map(Vec3::from)).collect();
+            TrianglePack::new(&chunk)
+        }));
+        leaf.meta2 = packs.len() as u32 - leaf.meta1;
+    }
+    packs
 }
 
 fn depth(tree: &Bvh2) -> usize {

@@ -33,25 +33,40 @@ fn sheet(cells: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     (positions.collect(), triangles.collect())
 }
 
+/// Möller and Trumbore 1997, in double precision: distance and side.
+fn exact_hit(corners: [Vec3; 3], origin: Vec3, direction: Vec3) -> Option<(f64, bool)> {
+    let [a, b, c] = corners.map(|p| p.as_dvec3());
+    let (origin, direction) = (origin.as_dvec3(), direction.as_dvec3());
+    let (e1, e2, s) = (b - a, c - a, origin - a);
+    let p = direction.cross(e2);
+    let determinant = e1.dot(p);
+    let (u, q) = (s.dot(p) / determinant, s.cross(e1));
+    let (v, t) = (direction.dot(q) / determinant, e2.dot(q) / determinant);
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some((t, determinant > 0.0))
+}
+
 #[test]
 fn hit_agrees_with_testing_every_triangle() {
     let (positions, triangles) = soup(500);
     let bvh = Bvh::new(&positions, &triangles);
-    let corners: Vec<_> = triangles.iter().map(|t| t.map(|i| Vec3A::from(positions[i as usize]))).collect();
     let mut state = 2;
     let mut hits = 0;
     for _ in 0..4000 {
         let (origin, direction) = (point(&mut state) * 2.0 - 0.5, point(&mut state) - 0.5);
-        let expected = (corners.iter().zip(0_u32..))
-            .filter_map(|(c, i)| Some((triangle::intersect(c, origin.into(), direction.into())?.distance, i)))
+        let corners = |t: &[u32; 3]| t.map(|i| positions[i as usize]);
+        let expected = (triangles.iter().zip(0_u32..))
+            .filter_map(|(t, i)| Some((exact_hit(corners(t), origin, direction)?, i)))
             .min_by(|a, b| a.partial_cmp(b).unwrap());
         let hit = bvh.hit(origin, direction, f32::INFINITY);
-        assert_eq!(hit.map(|h| (h.distance, h.triangle)), expected);
         assert_eq!(bvh.occluded(origin, direction, f32::INFINITY), expected.is_some());
-        if let Some((distance, _)) = expected {
-            hits += 1;
-            assert!(!bvh.occluded(origin, direction, distance), "nothing lies before the nearest hit");
-        }
+        assert_eq!(hit.map(|h| (h.triangle, h.front)), expected.map(|((_, front), i)| (i, front)));
+        let Some((hit, ((distance, _), _))) = hit.zip(expected) else { continue };
+        hits += 1;
+        assert!((f64::from(hit.distance) / distance - 1.0).abs() < 1e-4, "{} {distance}", hit.distance);
+        let t = corners(&triangles[hit.triangle as usize]);
+        let weighed = t[0] * hit.barycentric.x + t[1] * hit.barycentric.y + t[2] * hit.barycentric.z;
+        assert!(weighed.distance(origin + direction * hit.distance) < 1e-5);
+        assert!(!bvh.occluded(origin, direction, hit.distance), "nothing lies before the nearest hit");
     }
     assert!(hits > 50, "{hits} hits");
 }
@@ -67,7 +82,7 @@ fn closest_agrees_with_testing_every_triangle() {
         let p = point(&mut state) * 2.0 - 0.5;
         let expected = (corners.iter().zip(0_u32..))
             .filter(|&(_, i)| even(i))
-            .map(|(c, i)| (triangle::closest_point(c, p.into()).distance_squared(p.into()), i))
+            .map(|(c, i)| (nearest::closest_point(c, p.into()).distance_squared(p.into()), i))
             .min_by(|a, b| a.partial_cmp(b).unwrap())
             .unwrap();
         let nearest = bvh.closest(p, f32::INFINITY, even).unwrap();

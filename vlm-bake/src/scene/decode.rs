@@ -2,7 +2,7 @@
 
 use super::LoadOptions;
 use super::material::TextureRequest;
-use super::texture::{Sampling, Texture};
+use super::texture::Texture;
 use image::{ImageReader, Limits, RgbaImage};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -50,8 +50,9 @@ pub(super) fn textures(
 
 fn decode(file: &GltfFile, image: usize) -> Result<RgbaImage, String> {
     let bytes = file.image_bytes(image).map_err(|error| error.to_string())?;
-    let mut reader =
-        ImageReader::new(Cursor::new(bytes.as_ref())).with_guessed_format().map_err(|error| error.to_string())?;
+    let mut reader = ImageReader::new(Cursor::new(bytes.as_ref()))
+        .with_guessed_format()
+        .map_err(|error| error.to_string())?;
     let mut limits = Limits::default();
     limits.max_image_width = Some(MAX_SIDE);
     limits.max_image_height = Some(MAX_SIDE);
@@ -61,7 +62,12 @@ fn decode(file: &GltfFile, image: usize) -> Result<RgbaImage, String> {
 }
 
 /// One texture for each of the requests with these numbers.
-fn build(pixels: &RgbaImage, requests: &[TextureRequest], numbers: &[usize], options: &LoadOptions) -> Vec<Option<Texture>> {
+fn build(
+    pixels: &RgbaImage,
+    requests: &[TextureRequest],
+    numbers: &[usize],
+    options: &LoadOptions,
+) -> Vec<Option<Texture>> {
     let texels: Vec<[u8; 4]> = pixels.pixels().map(|pixel| pixel.0).collect();
     let size = [pixels.width(), pixels.height()];
     let build_one = |request: &TextureRequest| {
@@ -69,11 +75,4 @@ fn build(pixels: &RgbaImage, requests: &[TextureRequest], numbers: &[usize], opt
         Some(texture.at_most(options.max_texture_side))
     };
     numbers.iter().map(|&number| requests.get(number).and_then(build_one)).collect()
-}
-
-impl Texture {
-    fn white() -> Self {
-        let texels = vec![[255; 4]];
-        Self::from_srgb8([1, 1], texels, Sampling::default(), None).unwrap_or_default()
-    }
 }

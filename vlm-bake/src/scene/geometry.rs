@@ -81,7 +81,10 @@ fn triangles(mode: Mode, corners: &[u32]) -> Option<Vec<[u32; 3]>> {
         Mode::Triangles => Some(corners.chunks_exact(3).filter_map(|c| c.try_into().ok()).collect()),
         // Every other triangle of a strip winds the other way.
         Mode::TriangleStrip => Some(
-            windows.enumerate().map(|(i, [a, b, c])| if i % 2 == 0 { [a, b, c] } else { [a, c, b] }).collect(),
+            windows
+                .enumerate()
+                .map(|(i, [a, b, c])| if i % 2 == 0 { [a, b, c] } else { [a, c, b] })
+                .collect(),
         ),
         Mode::TriangleFan => {
             let (&hub, rim) = corners.split_first()?;
@@ -96,7 +99,12 @@ fn triangles(mode: Mode, corners: &[u32]) -> Option<Vec<[u32; 3]>> {
 /// # Errors
 /// [`Error::NotFinite`] if the transform takes a vertex beyond what `f32` holds, [`Error::TooLarge`] if the scene grows
 /// beyond what the arrays hold.
-pub(super) fn place(scene: &mut Scene, local: &LocalMesh, placement: &Placement, file: &str) -> Result<usize, Error> {
+pub(super) fn place(
+    scene: &mut Scene,
+    local: &LocalMesh,
+    placement: &Placement,
+    file: &str,
+) -> Result<usize, Error> {
     let world = world_positions(local, placement, file)?;
     let mut triangles = local.triangles.clone();
     if placement.mirrored {
@@ -112,7 +120,8 @@ pub(super) fn place(scene: &mut Scene, local: &LocalMesh, placement: &Placement,
         None => triangles.iter().flatten().copied().collect(),
     };
     if local.normals.is_none() {
-        triangles = (0..).step_by(3).take(triangles.len()).map(|first: u32| [first, first + 1, first + 2]).collect();
+        triangles =
+            (0..).step_by(3).take(triangles.len()).map(|first: u32| [first, first + 1, first + 2]).collect();
     }
     if scene.positions.len() + source.len() > MAX_VERTICES {
         return Err(Error::TooLarge { file: file.to_owned(), limit: MAX_VERTICES });
@@ -133,7 +142,14 @@ fn world_positions(local: &LocalMesh, placement: &Placement, file: &str) -> Resu
     })
 }
 
-fn push(scene: &mut Scene, local: &LocalMesh, world: &[Vec3], source: &[u32], triangles: &[[u32; 3]], placement: &Placement) {
+fn push(
+    scene: &mut Scene,
+    local: &LocalMesh,
+    world: &[Vec3],
+    source: &[u32],
+    triangles: &[[u32; 3]],
+    placement: &Placement,
+) {
     let first_vertex = scene.positions.len() as u32;
     let first_triangle = scene.triangles.len() as u32;
     scene.positions.extend(source.iter().map(|&v| corner(world, v)));
@@ -155,7 +171,9 @@ fn push(scene: &mut Scene, local: &LocalMesh, world: &[Vec3], source: &[u32], tr
 }
 
 fn push_attribute<T: Copy>(target: &mut Vec<T>, values: Option<&[T]>, source: &[u32], default: T) {
-    target.extend(source.iter().map(|&v| values.and_then(|values| values.get(v as usize)).copied().unwrap_or(default)));
+    target.extend(
+        source.iter().map(|&v| values.and_then(|values| values.get(v as usize)).copied().unwrap_or(default)),
+    );
 }
 
 /// The file's normals turned into the world; where it has none (or 0, or no number), the mean of the faces around.
@@ -191,21 +209,26 @@ fn world_normals(
 /// What turns normals: the inverse transpose up to a positive factor, by cofactors, so that a transform which flattens
 /// the mesh has one as well.
 pub(super) fn normal_matrix(world_from_local: DMat4) -> DMat3 {
-    let [x, y, z] = [world_from_local.x_axis, world_from_local.y_axis, world_from_local.z_axis].map(|c| c.truncate());
+    let [x, y, z] =
+        [world_from_local.x_axis, world_from_local.y_axis, world_from_local.z_axis].map(|c| c.truncate());
     let sign = if is_mirrored(world_from_local) { -1.0 } else { 1.0 };
     DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * sign
 }
 
 /// The transform turns left hands into right ones.
 pub(super) fn is_mirrored(world_from_local: DMat4) -> bool {
-    let [x, y, z] = [world_from_local.x_axis, world_from_local.y_axis, world_from_local.z_axis].map(|c| c.truncate());
+    let [x, y, z] =
+        [world_from_local.x_axis, world_from_local.y_axis, world_from_local.z_axis].map(|c| c.truncate());
     x.cross(y).dot(z) < 0.0
 }
 
 /// False if the triangle's height is within the rounding of its coordinates: its normal would be noise.
 fn has_area(corners: [Vec3; 3]) -> bool {
     let [a, b, c] = corners;
-    let longest = [(a, b), (b, c), (c, a)].map(|(p, q)| p.as_dvec3().distance(q.as_dvec3())).into_iter().fold(0.0, f64::max);
+    let longest = [(a, b), (b, c), (c, a)]
+        .map(|(p, q)| p.as_dvec3().distance(q.as_dvec3()))
+        .into_iter()
+        .fold(0.0, f64::max);
     let coordinate = corners.map(|p| p.abs().max_element()).into_iter().fold(0.0, f32::max);
     area_normal(corners).length() > longest * f64::from(coordinate * f32::EPSILON)
 }

@@ -41,7 +41,12 @@ pub(super) struct TextureRequest {
 }
 
 /// Reads all materials. Textures are asked for only where a `used` material's colour depends on them.
-pub(super) fn read(document: &gltf::Document, json: &Value, used: &[bool], notes: &mut Vec<String>) -> MaterialTable {
+pub(super) fn read(
+    document: &gltf::Document,
+    json: &Value,
+    used: &[bool],
+    notes: &mut Vec<String>,
+) -> MaterialTable {
     let mut table = MaterialTable::default();
     for (index, source) in document.materials().enumerate() {
         let used = used.get(index).copied().unwrap_or(false);
@@ -67,7 +72,14 @@ fn default_material() -> Material {
 }
 
 impl MaterialTable {
-    fn push(&mut self, source: &gltf::Material, unnamed: String, json: &Value, used: bool, notes: &mut Vec<String>) {
+    fn push(
+        &mut self,
+        source: &gltf::Material,
+        unnamed: String,
+        json: &Value,
+        used: bool,
+        notes: &mut Vec<String>,
+    ) {
         let ([r, g, b, alpha_factor], base_info) = base_color(source);
         let emission = Vec3::from_array(source.emissive_factor()) * source.emissive_strength().unwrap_or(1.0);
         let emissive_info = source.emissive_texture().filter(|_| emission != Vec3::ZERO);
@@ -99,7 +111,13 @@ impl MaterialTable {
     }
 
     /// The number of a texture to decode; equal requests share one. `None`, with a note, without a readable image.
-    fn request(&mut self, info: &Info, mask: Option<Mask>, json: &Value, notes: &mut Vec<String>) -> Option<u32> {
+    fn request(
+        &mut self,
+        info: &Info,
+        mask: Option<Mask>,
+        json: &Value,
+        notes: &mut Vec<String>,
+    ) -> Option<u32> {
         let texture = info.texture();
         let Some(image) = image_of(json, texture.index()) else {
             let note = format!("/textures/{}: no PNG, JPEG or WebP image; read as white", texture.index());
@@ -168,7 +186,10 @@ fn uv_source(info: &Info) -> UvSource {
 fn texture_from_vertex(offset: [f32; 2], rotation: f32, scale: [f32; 2]) -> Affine2 {
     let (sin, cos) = rotation.sin_cos();
     let rotate = Mat2::from_cols_array(&[cos, -sin, sin, cos]);
-    Affine2::from_mat2_translation(rotate * Mat2::from_diagonal(Vec2::from_array(scale)), Vec2::from_array(offset))
+    Affine2::from_mat2_translation(
+        rotate * Mat2::from_diagonal(Vec2::from_array(scale)),
+        Vec2::from_array(offset),
+    )
 }
 
 #[cfg(test)]

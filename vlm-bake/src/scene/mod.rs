@@ -36,6 +36,8 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// Authored light meshes: they are not part of the visible triangles.
     pub authored: Vec<AuthoredMesh>,
+    /// Triangles of the file that were left out because their height is within the rounding of their coordinates.
+    pub degenerate_triangles: usize,
     /// What was left out or guessed, for the user to read: place and reason.
     pub notes: Vec<String>,
 }
@@ -89,11 +91,13 @@ impl Default for Steering {
     }
 }
 
-/// A mesh that an artist made to be a VLM. `subtract` marks one that removes derived lights instead of adding its own.
+/// A mesh that an artist made to be a VLM.
 #[derive(Clone, Debug, Default)]
 pub struct AuthoredMesh {
     /// Index into [`Scene::objects`].
     pub object: u32,
+    /// Whether its triangles become lights, remove lights, or both.
+    pub mode: AuthoredMode,
     /// World-space vertices.
     pub positions: Vec<Vec3>,
     /// Triangles, counter-clockwise seen from the emitting side.
@@ -103,6 +107,18 @@ pub struct AuthoredMesh {
     pub albedo: Option<Vec<Vec3>>,
     /// Radiosity by its own emission, lx, per triangle.
     pub emission: Vec<Vec3>,
+}
+
+/// What an authored VLM does; `extras.vlm.mode` says so.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum AuthoredMode {
+    /// Its triangles become lights beside the derived ones (`"add"`).
+    #[default]
+    Add,
+    /// Derived lights inside it vanish; its own triangles are no lights (`"subtract"`).
+    Subtract,
+    /// Derived lights inside it vanish, and its triangles take their place (`"both"`, `"replace"`).
+    Both,
 }
 
 /// What a surface does with light.
@@ -179,4 +195,20 @@ pub enum Projection {
     Orthographic(f32),
 }
 
+mod load;
+mod node;
+mod steering;
+mod material;
+mod geometry;
+mod deform;
+mod decode;
 pub mod texture;
+mod surface;
+mod authored;
+mod light;
+mod camera;
+mod defaults;
+
+pub use authored::Volume;
+pub use load::{Error, LoadOptions, load};
+pub use surface::Surface;

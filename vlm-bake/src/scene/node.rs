@@ -29,7 +29,8 @@ pub(super) fn drawn_nodes(document: &gltf::Document) -> Vec<PlacedNode<'_>> {
             Some(seen) if !*seen => *seen = true,
             _ => continue,
         }
-        let world_from_parent = parent.and_then(|p: usize| placed.get(p)).map_or(DMat4::IDENTITY, |p| p.world_from_node);
+        let world_from_parent =
+            parent.and_then(|p: usize| placed.get(p)).map_or(DMat4::IDENTITY, |p| p.world_from_node);
         let world_from_node = world_from_parent * parent_from_node(&node);
         let first_child = pending.len();
         pending.extend(node.children().map(|child| (child, Some(placed.len()))));

@@ -22,7 +22,13 @@ pub(super) struct Request {
 ///
 /// # Errors
 /// [`Error::Steering`] with the JSON pointer of a value that has the wrong type or range.
-pub(super) fn read(file: &str, json: &Value, node: usize, mesh: usize, notes: &mut Vec<String>) -> Result<Request, Error> {
+pub(super) fn read(
+    file: &str,
+    json: &Value,
+    node: usize,
+    mesh: usize,
+    notes: &mut Vec<String>,
+) -> Result<Request, Error> {
     let mut request = Request::default();
     for (collection, index) in [("meshes", mesh), ("nodes", node)] {
         let owner = format!("/{collection}/{index}");
@@ -64,10 +70,24 @@ fn apply(extras: &Value, request: &mut Request, place: &Place) -> Result<(), Err
     let steering = &mut request.steering;
     set(extras, "intensity", "a number of 0 or more", place, non_negative, &mut steering.intensity)?;
     set(extras, "tint", "three numbers of 0 or more", place, tint, &mut steering.tint)?;
-    set(extras, "tag", "a whole number from 0 to 4294967295", place, |v| tag(v).map(Some), &mut steering.tag)?;
+    set(
+        extras,
+        "tag",
+        "a whole number from 0 to 4294967295",
+        place,
+        |v| tag(v).map(Some),
+        &mut steering.tag,
+    )?;
     set(extras, "exclude", "true or false", place, boolean, &mut steering.exclude)?;
     set(extras, "density", "a number above 0", place, positive, &mut steering.density)?;
-    set(extras, "mode", "\"add\", \"subtract\" or \"both\"", place, |v| mode(v).map(Some), &mut request.authored)
+    set(
+        extras,
+        "mode",
+        "\"add\", \"subtract\" or \"both\"",
+        place,
+        |v| mode(v).map(Some),
+        &mut request.authored,
+    )
 }
 
 /// Overwrites `target` if the key is there.
@@ -190,9 +210,11 @@ mod tests {
     fn a_mode_or_a_name_makes_a_mesh_an_authored_vlm() {
         let named = json!({ "meshes": [{ "name": "VLM_sky" }], "nodes": [{}] });
         assert_eq!(read_json(&named).unwrap().authored, Some(AuthoredMode::Add));
-        for (mode, expected) in
-            [("Add", AuthoredMode::Add), ("subtract", AuthoredMode::Subtract), ("replace", AuthoredMode::Both)]
-        {
+        for (mode, expected) in [
+            ("Add", AuthoredMode::Add),
+            ("subtract", AuthoredMode::Subtract),
+            ("replace", AuthoredMode::Both),
+        ] {
             let json = json!({ "nodes": [{ "name": "x-vlm", "extras": { "vlm": { "mode": mode } } }] });
             assert_eq!(read_json(&json).unwrap().authored, Some(expected));
         }

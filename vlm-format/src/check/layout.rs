@@ -134,7 +134,7 @@ fn check_accessor(accessor: &Value, views: &[Value], pointer: &str, report: &mut
     let bytes = element_bytes(accessor);
     match index(accessor, "bufferView").and_then(|i| views.get(i)) {
         Some(view) => check_elements(
-            Elements { owner: accessor, view, count: elements, bytes, may_stride: true },
+            &Elements { owner: accessor, view, count: elements, bytes, may_stride: true },
             pointer,
             report,
         ),
@@ -171,7 +171,7 @@ fn check_sparse(
         };
         if let Some(view) = index(owner, "bufferView").and_then(|i| views.get(i)) {
             let elements = Elements { owner, view, count: replaced, bytes, may_stride: false };
-            check_elements(elements, &format!("{pointer}/sparse/{key}"), report);
+            check_elements(&elements, &format!("{pointer}/sparse/{key}"), report);
         }
     }
 }
@@ -187,8 +187,8 @@ struct Elements<'a> {
     may_stride: bool,
 }
 
-fn check_elements(elements: Elements<'_>, pointer: &str, report: &mut Report) {
-    let Elements { owner, view, count: elements, bytes, may_stride } = elements;
+fn check_elements(elements: &Elements<'_>, pointer: &str, report: &mut Report) {
+    let Elements { owner, view, count: elements, bytes, may_stride } = *elements;
     let offset = count(owner, "byteOffset").unwrap_or(0);
     let stride = if may_stride { view_stride(view).unwrap_or(bytes) } else { bytes };
     if stride < bytes {

@@ -27,11 +27,7 @@ pub fn cross<const FUSED: bool>(a: Vec3, b: Vec3) -> Vec3 {
 /// `p + t e`.
 #[inline(always)]
 pub fn along<const FUSED: bool>(p: Vec3, t: f32, e: Vec3) -> Vec3 {
-    Vec3::new(
-        mul_add::<FUSED>(t, e.x, p.x),
-        mul_add::<FUSED>(t, e.y, p.y),
-        mul_add::<FUSED>(t, e.z, p.z),
-    )
+    Vec3::new(mul_add::<FUSED>(t, e.x, p.x), mul_add::<FUSED>(t, e.y, p.y), mul_add::<FUSED>(t, e.z, p.z))
 }
 
 /// `t Q(t) = atan(sqrt t) / sqrt t - 1` for `t` from 0 to 1, to 1.5e-8.

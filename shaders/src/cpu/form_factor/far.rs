@@ -64,6 +64,7 @@ pub fn far_triangle<const FUSED: bool>(light: &LightGeometry, r: Vec3, n: Vec3) 
 
     let tail = mul_add::<FUSED>(dot::<FUSED>(n, r_altitude), first, dot::<FUSED>(n, r_base) * second);
     let sum = mul_add::<FUSED>(dot::<FUSED>(n, normal), i12 + g12, tail);
-    let is_far = (d01 > CLOSEST) & (d12 > CLOSEST) & (d20 > CLOSEST) & (t01 <= 1.0) & (t12 <= 1.0) & (t20 <= 1.0);
+    let is_far =
+        (d01 > CLOSEST) & (d12 > CLOSEST) & (d20 > CLOSEST) & (t01 <= 1.0) & (t12 <= 1.0) & (t20 <= 1.0);
     (sum, is_far)
 }

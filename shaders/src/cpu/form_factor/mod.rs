@@ -10,6 +10,7 @@ mod light;
 mod far;
 mod near;
 mod lanes;
+mod moments;
 
 use std::f32::consts::{FRAC_1_PI, TAU};
 
@@ -17,6 +18,7 @@ use glam::Vec3;
 
 pub use lanes::{Receivers, form_factors, form_factors_portable};
 pub use light::LightGeometry;
+pub use moments::{ErrorBound, centroid_form_factor, form_factor_within, second_moment_form_factor};
 
 use arithmetic::dot;
 use far::far_triangle;

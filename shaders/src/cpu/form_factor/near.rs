@@ -129,12 +129,7 @@ pub fn clip_at_horizon<const FUSED: bool>(
             select3(is_quad, cut_c, a),
             select3(is_quad, cut_b, a),
         ],
-        edges: [
-            select3(is_quad | all, bc, h),
-            ca * share_c,
-            select3(is_quad, -h, Vec3::ZERO),
-            ab * share_b,
-        ],
+        edges: [select3(is_quad | all, bc, h), ca * share_c, select3(is_quad, -h, Vec3::ZERO), ab * share_b],
         share: select(is_quad, mul_add::<FUSED>(1.0 - share_b, share_c, share_b), share_b * share_c),
         is_quad,
     }
@@ -218,7 +213,10 @@ pub fn polygon_sum<const FUSED: bool>(polygon: &Polygon, n: Vec3, n_normal: f32)
     }
     let nearest = length[0].min(length[1]).min(length[2]).min(length[3]);
     let all_far = (nearest > NEAREST_BY_DIFFERENCES)
-        & weight[0].is_far & weight[1].is_far & weight[2].is_far & weight[3].is_far;
+        & weight[0].is_far
+        & weight[1].is_far
+        & weight[2].is_far
+        & weight[3].is_far;
     select(all_far, sum, plain)
 }
 

@@ -1,0 +1,43 @@
+//! `vlm-bench`: runs every method there is, for measurements.
+
+mod render;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use vlm_tests::form_factor::command;
+
+#[derive(Parser)]
+#[command(name = "vlm-bench", version, about = "Measures Virtual Light Meshes against other methods")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Render a picture by any method, and compare it with a reference
+    Render(render::RenderArgs),
+    /// Form factors of a file of cases, or the stress test
+    FormFactor(command::FormFactorArgs),
+    /// Measure the form factor's throughput on one core
+    Kernel(command::KernelArgs),
+}
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Render(args) => render::run(&args),
+        Command::FormFactor(args) => command::run(&args),
+        Command::Kernel(args) => {
+            command::run_kernel(&args);
+            Ok(())
+        }
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}

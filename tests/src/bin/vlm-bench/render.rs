@@ -1,0 +1,174 @@
+//! `vlm-bench render`: `vlm render` with every method, and the distance from a reference.
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+use vlm_bake::picture::{read_irradiance, write_irradiance, write_png};
+use vlm_bake::progress::Silent;
+use vlm_bake::render::{Method, RenderError, RenderOptions, RenderReport, Rendering, render};
+use vlm_bake::scene::{Camera, LoadOptions, Scene, load};
+use vlm_format::{GltfFile, VlmAsset, read_vlm};
+use vlm_tests::metrics::{Comparison, Metrics, compare};
+use vlm_tests::thesis::{self, ThesisOptions};
+
+/// Flags of `vlm-bench render`: those of `vlm render`, and what only this command has.
+#[derive(Args)]
+pub struct RenderArgs {
+    /// glTF file (.glb or .gltf)
+    file: PathBuf,
+    /// Camera of the file, by name or number from 0 [default: the first]
+    #[arg(long, value_name = "NAME|INDEX")]
+    camera: Option<String>,
+    /// Size of the picture in pixels
+    #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size)]
+    size: (u32, u32),
+    /// Where the indirect light comes from
+    #[arg(long, value_enum, default_value = "vlm")]
+    method: MethodArg,
+    /// Directions per pixel of the method `reference`
+    #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..))]
+    spp: u32,
+    /// Thesis: radius of a light's hemisphere over the light's own radius
+    #[arg(long, value_name = "R", default_value_t = 4.5)]
+    range: f32,
+    /// Thesis: entries of each cell's list
+    #[arg(long, value_name = "K", default_value_t = 128, value_parser = clap::value_parser!(u32).range(1..))]
+    list: u32,
+    /// Thesis: cells along each axis
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=512))]
+    grid: u32,
+    /// Write the picture, tone mapped
+    #[arg(long, value_name = "IMG.png")]
+    out: Option<PathBuf>,
+    /// Write the indirect irradiance in lx, RGB float32, 0 where nothing is hit
+    #[arg(long, value_name = "E1.exr")]
+    irradiance: Option<PathBuf>,
+    /// Compare with this indirect irradiance, as --irradiance wrote it
+    #[arg(long, value_name = "E1.exr")]
+    compare: Option<PathBuf>,
+    /// Report as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum MethodArg {
+    /// The virtual lights of each point's grid cell
+    Vlm,
+    /// Every virtual light at every pixel
+    Brute,
+    /// No indirect light
+    Direct,
+    /// Path tracing
+    Reference,
+    /// Aquotte 2017: active hemispheres, lists of fixed size, the textbook formula in single precision
+    Thesis,
+}
+
+/// What the thesis' lists held.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct ThesisReport {
+    dropped: u64,
+    overflowing_cells: u64,
+    build_seconds: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct BenchReport {
+    #[serde(flatten)]
+    render: RenderReport,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    thesis: Option<ThesisReport>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    metrics: Option<Metrics>,
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let numbers = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    numbers
+        .filter(|&(w, h)| w > 0 && h > 0)
+        .ok_or_else(|| "expected WIDTHxHEIGHT, such as 640x480".to_owned())
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Whatever keeps the picture from being made, written or compared.
+pub fn run(args: &RenderArgs) -> Result<(), Box<dyn Error>> {
+    let file = GltfFile::open(&args.file)?;
+    let scene = load(&file, &LoadOptions::default())?;
+    let needs_lights = !matches!(args.method, MethodArg::Direct | MethodArg::Reference);
+    let asset = if needs_lights { read_vlm(&file)? } else { None };
+    let camera = scene.camera(args.camera.as_deref())?;
+    let (rendering, thesis) = render_by(args, &scene, asset.as_ref(), &camera)?;
+    if let Some(path) = &args.irradiance {
+        write_irradiance(&rendering, path)?;
+    }
+    if let Some(path) = &args.out {
+        write_png(&rendering, path, None)?;
+    }
+    let report = BenchReport {
+        metrics: compared(args, &rendering)?,
+        thesis,
+        render: RenderReport {
+            camera: camera.name,
+            width: args.size.0,
+            height: args.size.1,
+            method: args.method.to_possible_value().map_or_else(String::new, |v| v.get_name().to_owned()),
+            stats: rendering.stats,
+        },
+    };
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&report)?);
+    } else {
+        println!("{report:#?}");
+    }
+    Ok(())
+}
+
+fn render_by(
+    args: &RenderArgs,
+    scene: &Scene,
+    asset: Option<&VlmAsset>,
+    camera: &Camera,
+) -> Result<(Rendering, Option<ThesisReport>), RenderError> {
+    let method = match args.method {
+        MethodArg::Thesis => {
+            let options = ThesisOptions { range: args.range, list: args.list, grid: args.grid };
+            let asset = asset.ok_or(RenderError::NoLights)?;
+            let (rendering, grid) = thesis::render(scene, asset, camera, args.size, &options, &Silent)?;
+            let report = ThesisReport {
+                dropped: grid.overflow.dropped,
+                overflowing_cells: grid.overflow.cells,
+                build_seconds: grid.build_seconds,
+            };
+            return Ok((rendering, Some(report)));
+        }
+        MethodArg::Vlm => Method::Vlm,
+        MethodArg::Brute => Method::Brute,
+        MethodArg::Direct => Method::Direct,
+        MethodArg::Reference => Method::Reference,
+    };
+    let (width, height) = args.size;
+    let options = RenderOptions { width, height, method, samples: args.spp };
+    Ok((render(scene, asset, camera, &options, &Silent)?, None))
+}
+
+/// The distance from the reference that was asked for, if any.
+fn compared(args: &RenderArgs, rendering: &Rendering) -> Result<Option<Metrics>, Box<dyn Error>> {
+    let Some(path) = &args.compare else { return Ok(None) };
+    let (width, height, truth) = read_irradiance(path)?;
+    if (width, height) != args.size {
+        let (w, h) = args.size;
+        return Err(
+            format!("{}: {width} x {height} pixels, but the picture has {w} x {h}", path.display()).into()
+        );
+    }
+    let hit: Vec<bool> = rendering.gbuffer.points.iter().map(Option::is_some).collect();
+    let comparison =
+        Comparison { width: width as usize, image: &rendering.indirect, truth: &truth, hit: &hit };
+    let metrics = compare(&comparison);
+    Ok(Some(metrics.ok_or_else(|| format!("{}: black, so nothing can be relative to it", path.display()))?))
+}

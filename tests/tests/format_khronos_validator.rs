@@ -1,0 +1,89 @@
+//! What is written passes the Khronos validator (npm package `gltf-validator`) with 0 errors.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::{Value, json};
+use vlm_format::{Container, GltfFile, Target, write_atomic, write_vlm};
+use vlm_tests::{assets, sample_asset};
+
+/// Files that are valid as they are.
+const FILES: &[&str] = &[
+    "trimesh/CesiumMilkTruck.glb",
+    "sascha/CesiumMan/glTF-Binary/CesiumMan.glb",
+    "generated/suzanne_quantized.glb",
+    "generated/sparse_positions.gltf",
+    "blender_io/19_sheen/19_sheen.gltf",
+];
+
+/// The folder with the node modules, `VLM_NPM` or `target/npm`. Without it, the tests read "ignored", or fail where
+/// `VLM_REQUIRE_NPM=1` promises that it is there.
+fn node_modules() -> Option<PathBuf> {
+    let default = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/npm");
+    let folder = std::env::var_os("VLM_NPM").map_or(default, PathBuf::from);
+    if folder.join("node_modules/gltf-validator").is_dir() {
+        return Some(folder);
+    }
+    let required = std::env::var("VLM_REQUIRE_NPM").is_ok_and(|value| value == "1");
+    assert!(!required, "gltf-validator is not in {} although VLM_REQUIRE_NPM=1", folder.display());
+    eprintln!("ignored: gltf-validator is not in {}", folder.display());
+    None
+}
+
+/// The validator's report on each file.
+fn validate(modules: &Path, files: &[PathBuf]) -> Vec<Value> {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("js/validate.mjs");
+    let output = Command::new("node").arg(script).arg(modules).args(files).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn errors(report: &Value) -> Vec<&Value> {
+    report["messages"].as_array().unwrap().iter().filter(|message| message["severity"] == 0).collect()
+}
+
+#[test]
+fn written_files_have_no_errors() {
+    let (Some(modules), Some(corpus)) = (node_modules(), assets::find("corpus")) else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let mut written = Vec::new();
+    for (i, name) in FILES.iter().enumerate() {
+        let file = GltfFile::open(&corpus.join(name)).unwrap();
+        let asset = sample_asset::quads(&file);
+        for (container, file_name) in [
+            (Container::Glb, "out.glb"),
+            (Container::Gltf { embedded: false }, "out.gltf"),
+            (Container::Gltf { embedded: true }, "embedded.gltf"),
+        ] {
+            let below = folder.path().join(i.to_string());
+            std::fs::create_dir_all(&below).unwrap();
+            let target = Target { container, file_name: file_name.to_owned() };
+            write_atomic(&write_vlm(&file, &asset, &target).unwrap(), &below).unwrap();
+            written.push(below.join(file_name));
+        }
+    }
+    let inputs: Vec<PathBuf> = FILES.iter().map(|name| corpus.join(name)).collect();
+    for report in validate(&modules, &inputs).iter().chain(&validate(&modules, &written)) {
+        assert_eq!(errors(report), Vec::<&Value>::new(), "{}", report["file"]);
+    }
+    println!("{} files written, 0 errors", written.len());
+}
+
+#[test]
+fn a_broken_file_has_errors() {
+    let (Some(modules), Some(corpus)) = (node_modules(), assets::find("corpus")) else { return };
+    let file = GltfFile::open(&corpus.join("generated/sparse_positions.gltf")).unwrap();
+    let target =
+        Target { container: Container::Gltf { embedded: true }, file_name: String::from("broken.gltf") };
+    let outputs = write_vlm(&file, &sample_asset::quads(&file), &target).unwrap();
+    let mut json: Value = serde_json::from_slice(&outputs[0].bytes).unwrap();
+    *json["accessors"].as_array_mut().unwrap().last_mut().unwrap().get_mut("count").unwrap() = json!(1000);
+    json["extensionsUsed"] = json!([]);
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("broken.gltf");
+    std::fs::write(&path, json.to_string()).unwrap();
+    let reports = validate(&modules, &[path]);
+    let codes: Vec<&Value> = errors(&reports[0]).iter().map(|message| &message["code"]).collect();
+    assert!(codes.contains(&&json!("ACCESSOR_TOO_LONG")), "{codes:?}");
+}

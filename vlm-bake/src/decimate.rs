@@ -1,0 +1,177 @@
+//! Stage 3: few triangles that follow the surface, one budget for the whole scene.
+//!
+//! This work is based on: Michael Garland, Paul Heckbert, "Surface simplification using quadric error metrics" (1997), as
+//! implemented by meshoptimizer. Coplanar triangles are then merged and triangulated again (`planar`), so that a flat wall costs
+//! few, well-shaped lights.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+use meshopt::SimplifyOptions;
+
+use crate::options::BakeOptions;
+use crate::patches::Patches;
+use crate::planar::merge_coplanar;
+use crate::topology::cross_of;
+
+/// A triangle mesh between decimation and the final lights, in world space.
+#[derive(Clone, Debug, Default)]
+pub struct LightMesh {
+    /// Vertices in metres; shared by the faces of one object that meet there.
+    pub positions: Vec<DVec3>,
+    /// The triangles.
+    pub faces: Vec<Face>,
+}
+
+/// A triangle of a [`LightMesh`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Face {
+    /// Indices into the mesh's positions, counter-clockwise seen from the emitting side.
+    pub vertices: [u32; 3],
+    /// Index into [`Patches::regions`].
+    pub region: u32,
+    /// The back of a two-sided surface.
+    pub back: bool,
+}
+
+impl LightMesh {
+    /// The corners of a face.
+    #[must_use]
+    pub fn corners(&self, face: usize) -> [DVec3; 3] {
+        self.faces[face].vertices.map(|v| self.positions[v as usize])
+    }
+
+    /// Area of a face in square metres.
+    #[must_use]
+    pub fn area(&self, face: usize) -> f64 {
+        0.5 * cross_of(self.corners(face)).length()
+    }
+
+    /// Unit normal of a face on its emitting side; zero for a face without area.
+    #[must_use]
+    pub fn normal(&self, face: usize) -> DVec3 {
+        cross_of(self.corners(face)).normalize_or_zero()
+    }
+}
+
+/// What decimation reached.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Decimation {
+    /// Faces asked for; both sides of two-sided surfaces count.
+    pub asked: usize,
+    /// Faces after merging, likewise.
+    pub reached: usize,
+    /// The simplifier's error (root of the mean squared distance at the worst collapse) in metres.
+    pub error_m: f64,
+}
+
+/// Decimates the patches to at most the surface's share of the budget, where topology allows it.
+#[must_use]
+pub fn decimate(patches: &Patches, options: &BakeOptions) -> (LightMesh, Decimation) {
+    let asked = (f64::from(options.lights) * options.surface_share) as usize;
+    let input = SimplifierInput::new(patches);
+    let doubled = patches.triangles.len()
+        + (0..patches.triangles.len()).filter(|&t| patches.region(t).two_sided).count();
+    let fronts = asked * patches.triangles.len() / doubled.max(1);
+    let (indices, error_m) = input.simplify(fronts, options.free_error as f32);
+    let mut mesh = merge_coplanar(input.mesh(patches, &indices));
+    add_backs(&mut mesh, patches);
+    let reached = mesh.faces.len();
+    (mesh, Decimation { asked, reached, error_m })
+}
+
+/// The patches as the simplifier wants them: one vertex per place *and region*, so that borders of regions are seams to it.
+struct SimplifierInput {
+    positions: Vec<[f32; 3]>,
+    indices: Vec<u32>,
+    vertex_welded: Vec<u32>,
+    vertex_region: Vec<u32>,
+}
+
+impl SimplifierInput {
+    fn new(patches: &Patches) -> Self {
+        // Relative to the first vertex, so that f32 keeps its digits in scenes far from the origin.
+        let origin = patches.positions.first().copied().unwrap_or_default();
+        let mut input = Self {
+            positions: Vec::new(),
+            indices: Vec::with_capacity(patches.triangles.len() * 3),
+            vertex_welded: Vec::new(),
+            vertex_region: Vec::new(),
+        };
+        let mut vertex_of: HashMap<(u32, u32), u32> = HashMap::new();
+        for (corners, &region) in patches.triangles.iter().zip(&patches.triangle_region) {
+            for &welded in corners {
+                let vertex = *vertex_of.entry((welded, region)).or_insert_with(|| {
+                    input.positions.push((patches.positions[welded as usize] - origin).as_vec3().to_array());
+                    input.vertex_welded.push(welded);
+                    input.vertex_region.push(region);
+                    input.positions.len() as u32 - 1
+                });
+                input.indices.push(vertex);
+            }
+        }
+        input
+    }
+
+    /// Indices of about `target` triangles, or fewer where that costs no more than `free_error` (a share of the extent);
+    /// with the error in metres.
+    fn simplify(&self, target: usize, free_error: f32) -> (Vec<u32>, f64) {
+        if self.indices.is_empty() {
+            return (Vec::new(), 0.0);
+        }
+        let scale = f64::from(meshopt::simplify_scale_decoder(&self.positions));
+        let run = |indices: &[u32], target: usize, limit: f32, options: SimplifyOptions| {
+            let mut error = 0.0;
+            let target = (target * 3).min(indices.len());
+            let shorter =
+                meshopt::simplify_decoder(indices, &self.positions, target, limit, options, Some(&mut error));
+            (shorter, error)
+        };
+        let (mut indices, mut error) = run(&self.indices, 0, free_error, SimplifyOptions::RegularizeLight);
+        // First within the topology; only a budget that this cannot meet removes whole islands.
+        for options in
+            [SimplifyOptions::RegularizeLight, SimplifyOptions::RegularizeLight | SimplifyOptions::Prune]
+        {
+            if indices.len() > target * 3 {
+                let (shorter, further) = run(&indices, target, f32::MAX, options);
+                (indices, error) = (shorter, error.max(further));
+            }
+        }
+        (indices, f64::from(error) * scale)
+    }
+
+    /// The welded mesh of a list of the simplifier's indices.
+    fn mesh(&self, patches: &Patches, indices: &[u32]) -> LightMesh {
+        let faces = indices
+            .chunks_exact(3)
+            .map(|corners| Face {
+                vertices: [0, 1, 2].map(|i| self.vertex_welded[corners[i] as usize]),
+                region: self.vertex_region[corners[0] as usize],
+                back: false,
+            })
+            .filter(|f| {
+                f.vertices[0] != f.vertices[1]
+                    && f.vertices[1] != f.vertices[2]
+                    && f.vertices[2] != f.vertices[0]
+            })
+            .collect();
+        LightMesh { positions: patches.positions.clone(), faces }
+    }
+}
+
+/// Gives two-sided surfaces a second sheet of faces with vertices of its own, turned round.
+fn add_backs(mesh: &mut LightMesh, patches: &Patches) {
+    let mut back_of: HashMap<u32, u32> = HashMap::new();
+    for f in 0..mesh.faces.len() {
+        let face = mesh.faces[f];
+        if patches.regions[face.region as usize].two_sided {
+            let [a, b, c] = face.vertices.map(|v| {
+                *back_of.entry(v).or_insert_with(|| {
+                    mesh.positions.push(mesh.positions[v as usize]);
+                    mesh.positions.len() as u32 - 1
+                })
+            });
+            mesh.faces.push(Face { vertices: [a, c, b], back: true, ..face });
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! The knobs of a bake and their presets.
+
+/// What a bake costs and how fine it is. Start from [`BakeOptions::preset`] and change what you need.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BakeOptions {
+    /// Name of the preset that these options started from, kept for the record.
+    pub preset: Preset,
+    /// Number of lights for the whole scene. More lights resolve shadows' borders and small colours better; every
+    /// frame's injection, the grid and the file grow in proportion.
+    pub lights: u32,
+    /// Share of the budget (0 to 1) that the decimated surface may use; the rest divides large lights. Higher values follow
+    /// curved surfaces more closely, lower values resolve light and shadow on large flat ones.
+    pub surface_share: f64,
+    /// Decimation goes on below the budget while its error stays under this share of the scene's extent. Higher values
+    /// free lights for large surfaces, at the cost of silhouettes and of deeper offsets.
+    pub free_error: f64,
+    /// Points on the visible surface that phase 1 lights, per light. Higher values soften the aliasing of shadow borders; the
+    /// cost of injection and about 36 bytes per sample grow in proportion.
+    pub samples: u32,
+    /// Points tested per light by `verify`, and the pool from which the samples are drawn. Higher values find smaller
+    /// violations; bake time grows in proportion.
+    pub tests_per_light: u32,
+    /// Edge of a grid cell in metres; `None` chooses one that suits the scene's extent. Smaller cells have shorter lists and
+    /// take more space.
+    pub cell_size: Option<f32>,
+    /// How far a light reaches in the grid, in multiples of its radius. Higher values lose less far light and lengthen
+    /// the lists with the square of the reach.
+    pub range: f32,
+}
+
+/// Named sets of options.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Preset {
+    /// A quick look: few lights, two samples each. The light of small objects blurs into that of their surroundings.
+    Draft,
+    /// For shipping: follows surfaces to about a thousandth of the scene, four samples a light.
+    #[default]
+    Game,
+    /// For stills and references: four times the lights of `Game`, sixteen samples each; bakes and renders slower in proportion.
+    Quality,
+}
+
+impl Preset {
+    /// All presets, cheapest first.
+    pub const ALL: [Self; 3] = [Self::Draft, Self::Game, Self::Quality];
+
+    /// The name used on the command line and in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Draft => "draft",
+            Self::Game => "game",
+            Self::Quality => "quality",
+        }
+    }
+
+    /// The budget of lights for a scene of that many visible triangles: a share of them, kept between the number that
+    /// a plain room needs and the number that a large scene can afford.
+    #[must_use]
+    pub fn lights(self, visible_triangles: usize) -> u32 {
+        let (share, least, most) = match self {
+            Self::Draft => (0.02, 120.0, 4_000.0),
+            Self::Game => (0.10, 460.0, 16_000.0),
+            Self::Quality => (0.40, 1_840.0, 64_000.0),
+        };
+        (visible_triangles as f64 * share).clamp(least, most) as u32
+    }
+}
+
+impl BakeOptions {
+    /// The options of a preset for a scene of that many visible triangles.
+    #[must_use]
+    pub fn preset(preset: Preset, visible_triangles: usize) -> Self {
+        let (samples, range) = match preset {
+            Preset::Draft => (2, 6.0),
+            Preset::Game => (4, 12.0),
+            Preset::Quality => (16, 24.0),
+        };
+        Self {
+            preset,
+            lights: preset.lights(visible_triangles),
+            surface_share: 0.6,
+            free_error: 2e-4,
+            samples,
+            tests_per_light: 20,
+            cell_size: None,
+            range,
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! What a bake made, as `--report` writes it. Other tools read these keys.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::tag::TagReport;
+use crate::verify::ClearanceReport;
+
+/// The report of one bake.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Report {
+    /// Triangles of the visible scene.
+    pub visible_triangles: usize,
+    /// Budget of lights.
+    pub asked_lights: u32,
+    /// Lights made.
+    pub lights: usize,
+    /// Why the budget was missed by more than 5 %, empty if it was met.
+    pub missed_because: String,
+    /// Of these, made by artists.
+    pub authored_lights: usize,
+    /// Samples over all lights.
+    pub samples: usize,
+    /// What decimation reached.
+    pub decimation: DecimationReport,
+    /// How far the lights moved.
+    pub offset: OffsetReport,
+    /// The proof that no light lights the surface that it stands for.
+    pub clearance: ClearanceReport,
+    /// Why a receiver may ignore some lights.
+    pub tags: Vec<TagReport>,
+    /// Total area of the lights, and of those that carry a tag, square metres.
+    pub area: AreaReport,
+    /// The grid, all 0 if the asset has none.
+    pub grid: GridReport,
+    /// Seconds per stage, in alphabetical order of the stages.
+    pub seconds: BTreeMap<&'static str, f64>,
+    /// BLAKE3 of the written file, empty before it is written.
+    pub hash: String,
+    /// What was left out or guessed while the scene was read.
+    pub notes: Vec<String>,
+}
+
+/// Decimation in figures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct DecimationReport {
+    /// Faces asked for.
+    pub asked: usize,
+    /// Faces reached, after coplanar ones were merged.
+    pub reached: usize,
+    /// The simplifier's error, metres.
+    pub error_m: f64,
+}
+
+/// The offset in figures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct OffsetReport {
+    /// Mean over the vertices, metres.
+    pub mean_m: f64,
+    /// Greatest, metres.
+    pub max_m: f64,
+}
+
+/// Areas in figures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct AreaReport {
+    /// Area of the surface that reflects or emits, square metres.
+    pub visible_m2: f64,
+    /// Part of it for which no light stands: what was too small for the budget.
+    pub uncovered_m2: f64,
+    /// Area of all lights, square metres.
+    pub lights_m2: f64,
+    /// Area of the lights that carry a tag, square metres.
+    pub tagged_m2: f64,
+}
+
+/// The grid in figures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct GridReport {
+    /// Cells of the box, stored or not.
+    pub cells: u64,
+    /// Cells that hold visible surface.
+    pub stored_cells: usize,
+    /// Lights over all lists.
+    pub entries: usize,
+    /// Bytes in the file.
+    pub bytes: usize,
+}

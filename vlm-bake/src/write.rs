@@ -1,0 +1,139 @@
+//! Stage 10: the finished lights as a [`VlmAsset`], in the spaces of their nodes.
+
+use std::collections::HashMap;
+
+use glam::{DMat3, DMat4, DVec3, Vec3};
+use vlm_format::{Grid, Sample, Settings, Vlm, VlmAsset};
+
+use crate::options::BakeOptions;
+use crate::samples::BakedLight;
+use crate::scene::Scene;
+use crate::tag::Tags;
+
+/// The tool's name and version as files carry it.
+pub const GENERATOR: &str = concat!("vlm-bake ", env!("CARGO_PKG_VERSION"));
+
+/// Puts lights in the order in which an asset holds them: by object, authored ones last within it.
+pub fn order(lights: &mut [BakedLight]) {
+    lights.sort_by_key(|light| (light.object, light.authored));
+}
+
+/// Collects ordered lights, tags and grid into an asset. Lights of an object whose transform has no inverse are left out.
+#[must_use]
+pub fn assemble(
+    scene: &Scene,
+    lights: &[BakedLight],
+    tags: &Tags,
+    grid: Option<Grid>,
+    options: &BakeOptions,
+) -> VlmAsset {
+    let mut asset = VlmAsset {
+        generator: GENERATOR.to_owned(),
+        settings: settings(options, grid.as_ref()),
+        primitive_tags: tags.primitives(),
+        sample_starts: vec![0],
+        grid,
+        ..VlmAsset::default()
+    };
+    let mut ids: HashMap<String, u32> = HashMap::new();
+    for run in lights.chunk_by(|a, b| (a.object, a.authored) == (b.object, b.authored)) {
+        append(&mut asset, scene, run, &mut ids);
+    }
+    if asset.emission.iter().all(|&e| e == Vec3::ZERO) {
+        asset.emission.clear();
+    }
+    if asset.tags.iter().all(|&t| t == 0) {
+        asset.tags.clear();
+    }
+    asset
+}
+
+fn settings(options: &BakeOptions, grid: Option<&Grid>) -> Settings {
+    Settings {
+        preset: options.preset.name().to_owned(),
+        lights: options.lights,
+        cell_size: grid.map_or(0.0, |g| g.cell_size),
+        range: options.range,
+        samples: options.samples,
+    }
+}
+
+/// Appends the lights of one object.
+fn append(asset: &mut VlmAsset, scene: &Scene, run: &[BakedLight], ids: &mut HashMap<String, u32>) {
+    let Some(first) = run.first() else { return };
+    let object = &scene.objects[first.object as usize];
+    let to_node = NodeSpace::new(object.world_from_node);
+    let lights = [asset.triangles.len() as u32, run.len() as u32];
+    let first_vertex = asset.positions.len() as u32;
+    let mut vertex_of: HashMap<[u32; 3], u32> = HashMap::new();
+    for light in run {
+        let mut corners = light.corners.map(|p| {
+            let p = to_node.point(p);
+            *vertex_of.entry(p.to_array().map(f32::to_bits)).or_insert_with(|| {
+                asset.positions.push(p);
+                asset.positions.len() as u32 - 1
+            })
+        });
+        if to_node.mirrored {
+            corners.swap(1, 2);
+        }
+        asset.triangles.push(corners);
+        asset.albedo.push(light.albedo);
+        asset.emission.push(light.emission);
+        asset.tags.push(light.tag);
+        asset.samples.extend(light.samples.iter().map(|s| Sample {
+            position: to_node.point(s.position),
+            normal: to_node.normal(s.normal),
+            reflectance: s.reflectance,
+        }));
+        asset.sample_starts.push(asset.samples.len() as u32);
+    }
+    asset.vlms.push(Vlm {
+        id: unique(if object.path.is_empty() { "scene" } else { &object.path }, ids),
+        node: object.node,
+        lights,
+        vertices: [first_vertex, asset.positions.len() as u32 - first_vertex],
+        authored: first.authored,
+    });
+}
+
+/// An id that no other VLM of the file has.
+fn unique(path: &str, ids: &mut HashMap<String, u32>) -> String {
+    let uses = ids.entry(path.to_owned()).or_insert(0);
+    *uses += 1;
+    if *uses == 1 { path.to_owned() } else { unique(&format!("{path}#{uses}"), ids) }
+}
+
+/// World space to a node's.
+struct NodeSpace {
+    node_from_world: DMat4,
+    /// Normals go by the transpose of the opposite transform.
+    node_from_world_normal: DMat3,
+    /// The transform turns triangles round.
+    mirrored: bool,
+}
+
+impl NodeSpace {
+    fn new(world_from_node: DMat4) -> Self {
+        Self {
+            node_from_world: world_from_node.inverse(),
+            node_from_world_normal: DMat3::from_mat4(world_from_node).transpose(),
+            mirrored: world_from_node.determinant() < 0.0,
+        }
+    }
+
+    fn point(&self, p_world: DVec3) -> Vec3 {
+        self.node_from_world.transform_point3(p_world).as_vec3()
+    }
+
+    fn normal(&self, n_world: DVec3) -> Vec3 {
+        (self.node_from_world_normal * n_world).normalize_or_zero().as_vec3()
+    }
+}
+
+/// True if a light can be expressed in the space of its node: the node's transform has an inverse.
+#[must_use]
+pub fn placeable(scene: &Scene, light: &BakedLight) -> bool {
+    let world_from_node = scene.objects[light.object as usize].world_from_node;
+    world_from_node.determinant() != 0.0 && world_from_node.inverse().is_finite()
+}

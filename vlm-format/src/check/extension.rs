@@ -1,0 +1,74 @@
+//! The shape of `VLM_virtual_light_mesh`, as tables.
+
+use super::shape::Shape::{self, Bool, Count, List, Number, Numbers, Object, Objects, Small, Text};
+use super::shape::{Field, may, must};
+use super::tables::{ACCESSOR, VIEW};
+
+const NAME: &str = "VLM_virtual_light_mesh";
+
+/// The extension's objects in the root, in nodes and in primitives; nothing else of the file.
+pub(super) const EXTENSION: &[Field] = &[
+    may("extensions", Object(&[may(NAME, Object(ROOT))])),
+    may("nodes", List(&Object(&[may("extensions", Object(&[may(NAME, Object(&[must("vlm", Text)]))]))]))),
+    may(
+        "meshes",
+        Objects(&[must(
+            "primitives",
+            List(&Object(&[may("extensions", Object(&[may(NAME, Object(&[must("tag", Count)]))]))])),
+        )]),
+    ),
+];
+
+/// One array of the extension.
+const ARRAY: Shape = Object(&[must("accessor", ACCESSOR), must("digest", Text)]);
+
+/// The root object of `VLM_virtual_light_mesh`.
+const ROOT: &[Field] = &[
+    must("generator", Text),
+    must("settings", Object(&[])),
+    must("data", Object(&[must("bufferView", VIEW), must("bufferByteLength", Count)])),
+    must(
+        "vlms",
+        Objects(&[
+            must("id", Text),
+            must("lights", RANGE),
+            must("vertices", RANGE),
+            may("authored", Bool),
+            must("digests", Object(&[must("geometry", Text), must("transform", Text)])),
+        ]),
+    ),
+    must(
+        "lights",
+        Object(&[
+            may("positions", ARRAY),
+            may("indices", ARRAY),
+            may("albedo", ARRAY),
+            may("emission", ARRAY),
+            may("tags", ARRAY),
+        ]),
+    ),
+    must(
+        "samples",
+        Object(&[
+            must("starts", ARRAY),
+            may("positions", ARRAY),
+            may("normals", ARRAY),
+            may("reflectance", ARRAY),
+        ]),
+    ),
+    may(
+        "grid",
+        Object(&[
+            must("origin", Numbers(3)),
+            must("cellSize", Number),
+            must("dimensions", Small(3)),
+            may("cells", ARRAY),
+            must("starts", ARRAY),
+            may("entries", ARRAY),
+            must("sceneDigest", Text),
+        ]),
+    ),
+];
+
+/// First element and number of elements.
+const RANGE: Shape = Small(2);

@@ -1,0 +1,270 @@
+//! Reads a [`VlmAsset`] out of a glTF file and says when it no longer fits the file around it.
+
+use glam::Vec3;
+use serde_json::Value;
+
+use crate::asset::{Grid, Sample, Settings, Vlm, VlmAsset};
+use crate::check::{self, array, count, index};
+use crate::container::GltfFile;
+use crate::digest::{self, Source};
+use crate::error::{Error, Issue, Stale};
+use crate::nodes;
+use crate::strip::EXTENSION;
+use crate::validate::validate;
+
+/// Reads the Virtual Light Meshes of a file; `None` if it has none.
+///
+/// # Errors
+/// [`Error::Stale`] names every VLM whose source geometry, transform or own data changed since it was written, and why;
+/// [`Error::Invalid`] if the data breaks the invariants of [`VlmAsset`].
+pub fn read_vlm(file: &GltfFile) -> Result<Option<VlmAsset>, Error> {
+    read(file, Trust::Verify)
+}
+
+/// Reads as [`read_vlm`] does, without comparing any digest: for tools that show or mend stale files.
+///
+/// # Errors
+/// [`Error::Stale`] if the extension is incomplete; [`Error::Invalid`] as [`read_vlm`].
+pub fn read_vlm_unchecked(file: &GltfFile) -> Result<Option<VlmAsset>, Error> {
+    read(file, Trust::Blind)
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Trust {
+    Verify,
+    Blind,
+}
+
+fn read(file: &GltfFile, trust: Trust) -> Result<Option<VlmAsset>, Error> {
+    let Some(extension) = file.json().get("extensions").and_then(|all| all.get(EXTENSION)) else {
+        return if_orphaned(file).map_or(Ok(None), |stale| refuse(file, vec![stale]));
+    };
+    let mut reader = Reader { file, extension, trust, stale: Vec::new() };
+    reader.check_shape();
+    reader.fail_if_stale()?;
+    let mut asset = reader.asset();
+    reader.bearers(&mut asset);
+    reader.fail_if_stale()?;
+    if trust == Trust::Verify {
+        reader.compare_sources(&asset)?;
+        reader.fail_if_stale()?;
+    }
+    match validate(&asset) {
+        issues if issues.is_empty() => Ok(Some(asset)),
+        issues => Err(Error::Invalid { file: file.name().to_owned(), issues }),
+    }
+}
+
+fn refuse<T>(file: &GltfFile, stale: Vec<Stale>) -> Result<T, Error> {
+    Err(Error::Stale { file: file.name().to_owned(), stale })
+}
+
+/// Nodes that refer to VLMs without the root object that would hold them.
+fn if_orphaned(file: &GltfFile) -> Option<Stale> {
+    let nodes = array(file.json(), "/nodes");
+    let node = nodes.iter().position(|node| own(node).is_some())?;
+    let path = nodes::path(file, &nodes::parents(file), node);
+    let reason =
+        format!("`{path}` refers to a VLM, but another tool removed the root object of the extension");
+    Some(Stale { vlm: String::from("asset"), reason })
+}
+
+/// The extension's object in a node or primitive.
+fn own(item: &Value) -> Option<&Value> {
+    item.get("extensions")?.get(EXTENSION)
+}
+
+struct Reader<'a> {
+    file: &'a GltfFile,
+    extension: &'a Value,
+    trust: Trust,
+    stale: Vec<Stale>,
+}
+
+impl Reader<'_> {
+    fn fail_if_stale(&mut self) -> Result<(), Error> {
+        if self.stale.is_empty() { Ok(()) } else { refuse(self.file, std::mem::take(&mut self.stale)) }
+    }
+
+    fn outdated(&mut self, vlm: &str, reason: String) {
+        self.stale.push(Stale { vlm: vlm.to_owned(), reason });
+    }
+
+    /// An extension that lost properties, or accessors that do not exist, were left behind by another tool.
+    fn check_shape(&mut self) {
+        for Issue { pointer, message, .. } in check::check_extension(self.file.json()).into_issues() {
+            self.outdated("asset", format!("another tool altered the file: {pointer}: {message}"));
+        }
+    }
+
+    fn asset(&mut self) -> VlmAsset {
+        let text = |key| self.extension.get(key).and_then(Value::as_str).unwrap_or_default().to_owned();
+        let settings = self.extension.get("settings").cloned().unwrap_or_default();
+        let positions = self.vectors("samples", "positions");
+        let normals = self.vectors("samples", "normals");
+        let reflectance = self.vectors("samples", "reflectance");
+        let samples = positions.into_iter().zip(normals).zip(reflectance);
+        VlmAsset {
+            generator: text("generator"),
+            settings: serde_json::from_value::<Settings>(settings).unwrap_or_default(),
+            vlms: array(self.extension, "/vlms").iter().map(vlm).collect(),
+            positions: self.vectors("lights", "positions"),
+            triangles: self.integers("lights", "indices").as_chunks().0.to_vec(),
+            albedo: self.vectors("lights", "albedo"),
+            emission: self.vectors("lights", "emission"),
+            tags: self.integers("lights", "tags"),
+            sample_starts: self.integers("samples", "starts"),
+            samples: samples
+                .map(|((position, normal), reflectance)| Sample { position, normal, reflectance })
+                .collect(),
+            primitive_tags: primitive_tags(self.file),
+            grid: self.extension.get("grid").map(|json| self.grid(json)),
+        }
+    }
+
+    fn grid(&mut self, json: &Value) -> Grid {
+        let dimensions =
+            array(json, "/dimensions").iter().map(|size| size.as_u64().unwrap_or_default() as u32);
+        Grid {
+            origin: nodes::numbers(json, "origin")
+                .map_or(Vec3::NAN, |origin| glam::DVec3::from(origin).as_vec3()),
+            cell_size: json.get("cellSize").and_then(Value::as_f64).unwrap_or(f64::NAN) as f32,
+            dimensions: dimensions.collect::<Vec<u32>>().try_into().unwrap_or_default(),
+            cells: self.integers("grid", "cells"),
+            starts: self.integers("grid", "starts"),
+            entries: self.integers("grid", "entries"),
+        }
+    }
+
+    fn vectors(&mut self, group: &str, key: &str) -> Vec<Vec3> {
+        let read = |file: &GltfFile, accessor| {
+            let values = file.read_vec3(accessor)?;
+            let bytes = values.iter().flat_map(|value| value.to_array()).flat_map(f32::to_le_bytes).collect();
+            Ok((values, bytes))
+        };
+        self.elements(group, key, "VEC3", read)
+    }
+
+    fn integers(&mut self, group: &str, key: &str) -> Vec<u32> {
+        let read = |file: &GltfFile, accessor| {
+            let values = file.read_u32(accessor)?;
+            let bytes = values.iter().copied().flat_map(u32::to_le_bytes).collect();
+            Ok((values, bytes))
+        };
+        self.elements(group, key, "SCALAR", read)
+    }
+
+    /// Reads an array; absent ones are empty. One that cannot be read, or has another digest, is stale.
+    fn elements<T>(
+        &mut self,
+        group: &str,
+        key: &str,
+        kind: &str,
+        read: impl Fn(&GltfFile, usize) -> Result<(Vec<T>, Vec<u8>), Error>,
+    ) -> Vec<T> {
+        let Some(json) = self.extension.get(group).and_then(|group| group.get(key)) else {
+            return Vec::new();
+        };
+        let accessor = index(json, "accessor").unwrap_or(usize::MAX);
+        let vlm = if group == "grid" { "grid" } else { "asset" };
+        let altered =
+            format!("accessor {accessor} `{group}/{key}` was renumbered or altered by another tool");
+        match read(self.file, accessor) {
+            Ok((_, bytes))
+                if self.trust == Trust::Verify
+                    && digest::of_array(kind, &bytes) != digest::text(json, "digest") =>
+            {
+                self.outdated(vlm, altered);
+                Vec::new()
+            }
+            Ok((values, _)) => values,
+            Err(Error::Invalid { issues, .. }) => {
+                let why = issues.first().map(|issue| issue.message.clone()).unwrap_or_default();
+                self.outdated(vlm, format!("{altered} ({why})"));
+                Vec::new()
+            }
+            Err(other) => {
+                self.outdated(vlm, format!("{altered} ({other})"));
+                Vec::new()
+            }
+        }
+    }
+
+    /// Finds the node that bears each VLM.
+    fn bearers(&mut self, asset: &mut VlmAsset) {
+        let parents = nodes::parents(self.file);
+        let mut bearers: Vec<Option<usize>> = vec![None; asset.vlms.len()];
+        for (node, json) in array(self.file.json(), "/nodes").iter().enumerate() {
+            let Some(id) = own(json).and_then(|own| own.get("vlm")?.as_str()) else { continue };
+            let path = || nodes::path(self.file, &parents, node);
+            match asset.vlms.iter().position(|vlm| vlm.id == id) {
+                None => self.outdated(id, format!("`{}` refers to it, but it does not exist", path())),
+                Some(vlm) => match bearers[vlm] {
+                    None => bearers[vlm] = Some(node),
+                    Some(first) => {
+                        let first = nodes::path(self.file, &parents, first);
+                        self.outdated(id, format!("both `{first}` and `{}` refer to it", path()));
+                    }
+                },
+            }
+        }
+        for (vlm, bearer) in asset.vlms.iter_mut().zip(bearers) {
+            match bearer {
+                Some(node) => vlm.node = node as u32,
+                None => self.outdated(&vlm.id, String::from("no node refers to it any more")),
+            }
+        }
+    }
+
+    /// Compares the digests of the sources with what the file now holds.
+    fn compare_sources(&mut self, asset: &VlmAsset) -> Result<(), Error> {
+        let parents = nodes::parents(self.file);
+        let mut source = Source::new(self.file);
+
+        for (vlm, json) in asset.vlms.iter().zip(array(self.extension, "/vlms")) {
+            let node = vlm.node as usize;
+            let digests = json.get("digests").unwrap_or(&Value::Null);
+            let path = nodes::path(self.file, &parents, node);
+            if source.geometry(node)? != digest::text(digests, "geometry") {
+                self.outdated(&vlm.id, format!("geometry or colours of `{path}` changed"));
+            }
+            if asset.grid.is_some() && source.transform(node)? != digest::text(digests, "transform") {
+                self.outdated("grid", format!("`{path}` was moved"));
+            }
+        }
+        let Some(grid) = self.extension.get("grid") else { return Ok(()) };
+        if self.stale.is_empty() && source.scene()? != digest::text(grid, "sceneDigest") {
+            self.outdated("grid", String::from("a visible object was added, removed, moved or changed"));
+        }
+        Ok(())
+    }
+}
+
+fn vlm(json: &Value) -> Vlm {
+    let range = |key| {
+        let mut numbers = array(json, key).iter().map(|number| number.as_u64().unwrap_or_default() as u32);
+        [numbers.next().unwrap_or_default(), numbers.next().unwrap_or_default()]
+    };
+    Vlm {
+        id: json.get("id").and_then(Value::as_str).unwrap_or_default().to_owned(),
+        node: 0,
+        lights: range("/lights"),
+        vertices: range("/vertices"),
+        authored: json.get("authored").and_then(Value::as_bool).unwrap_or(false),
+    }
+}
+
+/// Tags of visible primitives, in the order of the file.
+fn primitive_tags(file: &GltfFile) -> Vec<(u32, u32, u32)> {
+    let mut tags = Vec::new();
+    for (m, mesh) in array(file.json(), "/meshes").iter().enumerate() {
+        for (p, primitive) in array(mesh, "/primitives").iter().enumerate() {
+            let tag =
+                own(primitive).and_then(|own| count(own, "tag")).and_then(|tag| u32::try_from(tag).ok());
+            if let Some(tag) = tag.filter(|&tag| tag != 0) {
+                tags.push((m as u32, p as u32, tag));
+            }
+        }
+    }
+    tags
+}

@@ -1,0 +1,304 @@
+//! The invariants of a [`VlmAsset`], checked before it is written and after it is read.
+
+use std::collections::HashSet;
+
+use glam::Vec3;
+
+use crate::asset::{Grid, VlmAsset};
+use crate::error::{Code, Issue};
+
+/// Longest edge over height that a light may have: beyond it, single precision cannot hold its form factor.
+pub const MAX_ASPECT_RATIO: f64 = 100.0;
+
+/// How far the aspect ratio may exceed its limit through rounding of the vertices to single precision.
+const ASPECT_SLACK: f64 = 1.001;
+
+/// How far the length of a sample's normal may be from 1.
+const NORMAL_SLACK: f32 = 1e-3;
+
+/// All rules that the asset breaks; empty for a valid one. Pointers name fields of [`VlmAsset`], as `/vlms/0/lights`.
+pub fn validate(asset: &VlmAsset) -> Vec<Issue> {
+    let mut issues = Issues::default();
+    lengths(asset, &mut issues);
+    if issues.0.is_empty() {
+        vlms(asset, &mut issues);
+        lights(asset, &mut issues);
+        samples(asset, &mut issues);
+        primitive_tags(asset, &mut issues);
+        settings(asset, &mut issues);
+        if let Some(grid) = &asset.grid {
+            check_grid(grid, asset.triangles.len(), &mut issues);
+        }
+    }
+    issues.0
+}
+
+#[derive(Default)]
+struct Issues(Vec<Issue>);
+
+impl Issues {
+    fn check(&mut self, holds: bool, code: Code, pointer: &str, message: impl FnOnce() -> String) {
+        if !holds {
+            self.0.push(Issue::error(code, pointer, message()));
+        }
+    }
+
+    /// Reports the first element that breaks a rule: the rest seldom says more.
+    fn check_all<T>(
+        &mut self,
+        list: &[T],
+        code: Code,
+        pointer: &str,
+        rule: &str,
+        holds: impl Fn(&T) -> bool,
+    ) {
+        if let Some(at) = list.iter().position(|element| !holds(element)) {
+            self.0.push(Issue::error(code, format!("{pointer}/{at}"), rule));
+        }
+    }
+}
+
+/// Arrays that run alongside each other have the same length; the rest relies on it.
+fn lengths(asset: &VlmAsset, issues: &mut Issues) {
+    let lights = asset.triangles.len();
+    let optional = |length: usize| length == 0 || length == lights;
+    let mut check = |holds: bool, name: &str, length: usize| {
+        issues.check(holds, Code::VlmLength, &format!("/{name}"), || {
+            format!("{length} values for {lights} lights")
+        });
+    };
+    check(asset.albedo.len() == lights, "albedo", asset.albedo.len());
+    check(optional(asset.emission.len()), "emission", asset.emission.len());
+    check(optional(asset.tags.len()), "tags", asset.tags.len());
+    check(asset.sample_starts.len() == lights + 1, "sample_starts", asset.sample_starts.len());
+}
+
+/// Ids are unique, ranges follow each other without gaps, and triangles stay within their VLM's vertices.
+fn vlms(asset: &VlmAsset, issues: &mut Issues) {
+    let mut ends = [0_u64; 2];
+    let (mut ids, mut nodes) = (HashSet::new(), HashSet::new());
+    for (i, vlm) in asset.vlms.iter().enumerate() {
+        let pointer = format!("/vlms/{i}");
+        for (end, (range, name)) in ends.iter_mut().zip([(vlm.lights, "lights"), (vlm.vertices, "vertices")])
+        {
+            issues.check(u64::from(range[0]) == *end, Code::VlmRange, &format!("{pointer}/{name}"), || {
+                format!("begins at {}, the one before ends at {end}", range[0])
+            });
+            *end += u64::from(range[1]);
+        }
+        issues.check(ids.insert(&vlm.id) && !vlm.id.is_empty(), Code::VlmId, &pointer, || {
+            format!("the id `{}` is empty or not unique", vlm.id)
+        });
+        issues.check(nodes.insert(vlm.node), Code::VlmId, &pointer, || {
+            format!("node {} bears another VLM too", vlm.node)
+        });
+        triangles_within(asset, i, issues);
+    }
+    let lengths = [asset.triangles.len() as u64, asset.positions.len() as u64];
+    issues.check(ends == lengths, Code::VlmRange, "/vlms", || {
+        format!("cover {} lights and {} vertices of {} and {}", ends[0], ends[1], lengths[0], lengths[1])
+    });
+}
+
+fn triangles_within(asset: &VlmAsset, vlm: usize, issues: &mut Issues) {
+    let [first, count] = asset.vlms[vlm].vertices;
+    let lights = asset.vlms[vlm].lights;
+    let Some(triangles) = slice(&asset.triangles, lights) else { return };
+    let inside = |&vertex: &u32| vertex >= first && vertex - first < count;
+    if let Some(at) = triangles.iter().position(|triangle| !triangle.iter().all(inside)) {
+        let pointer = format!("/triangles/{}", lights[0] as usize + at);
+        issues.check(false, Code::VlmIndex, &pointer, || {
+            String::from("a vertex lies outside of the VLM's range")
+        });
+    }
+}
+
+fn slice<T>(list: &[T], range: [u32; 2]) -> Option<&[T]> {
+    let start = range[0] as usize;
+    list.get(start..start.checked_add(range[1] as usize)?)
+}
+
+fn lights(asset: &VlmAsset, issues: &mut Issues) {
+    let finite = |vector: &Vec3| vector.is_finite();
+    issues.check_all(&asset.positions, Code::VlmNumber, "/positions", "not finite", finite);
+    issues.check_all(&asset.albedo, Code::VlmNumber, "/albedo", "not finite", finite);
+    issues.check_all(&asset.emission, Code::VlmNumber, "/emission", "not finite", finite);
+    issues.check_all(
+        &asset.triangles,
+        Code::VlmAspect,
+        "/triangles",
+        "degenerate, or longer than 100 times its height",
+        |triangle| aspect_ratio(asset, triangle).is_none_or(|ratio| ratio <= MAX_ASPECT_RATIO * ASPECT_SLACK),
+    );
+}
+
+/// Longest edge over the height on it, infinite for a degenerate triangle; `None` if a vertex does not exist.
+fn aspect_ratio(asset: &VlmAsset, triangle: &[u32; 3]) -> Option<f64> {
+    let corner = |i: usize| asset.positions.get(triangle[i] as usize).map(|position| position.as_dvec3());
+    let (a, b, c) = (corner(0)?, corner(1)?, corner(2)?);
+    let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+    // height = 2 area / longest edge, so edge / height = edge^2 / (2 area)
+    Some(longest / (b - a).cross(c - a).length())
+        .map(|ratio| if ratio.is_nan() { f64::INFINITY } else { ratio })
+}
+
+fn samples(asset: &VlmAsset, issues: &mut Issues) {
+    check_starts(&asset.sample_starts, asset.samples.len(), "/sample_starts", issues);
+    issues.check_all(
+        &asset.samples,
+        Code::VlmNumber,
+        "/samples",
+        "not finite, or the normal's length is not 1",
+        |sample| {
+            sample.position.is_finite()
+                && sample.reflectance.is_finite()
+                && (sample.normal.length() - 1.0).abs() <= NORMAL_SLACK
+        },
+    );
+}
+
+/// Offsets begin at 0, never fall, and end at the length of what they point into.
+fn check_starts(starts: &[u32], length: usize, pointer: &str, issues: &mut Issues) {
+    let ends_fit = starts.first() == Some(&0) && starts.last().is_some_and(|&last| last as usize == length);
+    let monotone = starts.is_sorted();
+    issues.check(ends_fit && monotone, Code::VlmOrder, pointer, || {
+        format!("the offsets do not rise from 0 to {length}")
+    });
+}
+
+fn primitive_tags(asset: &VlmAsset, issues: &mut Issues) {
+    let ascending = asset.primitive_tags.is_sorted_by(|a, b| (a.0, a.1) < (b.0, b.1));
+    issues.check(ascending, Code::VlmOrder, "/primitive_tags", || {
+        String::from("not sorted, or a primitive occurs twice")
+    });
+    issues.check_all(&asset.primitive_tags, Code::VlmNumber, "/primitive_tags", "the tag is 0", |entry| {
+        entry.2 != 0
+    });
+}
+
+fn settings(asset: &VlmAsset, issues: &mut Issues) {
+    let settings = &asset.settings;
+    let finite = settings.cell_size.is_finite() && settings.range.is_finite();
+    issues.check(finite, Code::VlmNumber, "/settings", || String::from("a number is not finite"));
+}
+
+fn check_grid(grid: &Grid, lights: usize, issues: &mut Issues) {
+    let positive = grid.origin.is_finite() && grid.cell_size.is_finite() && grid.cell_size > 0.0;
+    issues.check(positive, Code::VlmNumber, "/grid", || {
+        String::from("origin or cell size is not finite, or no cell has a size")
+    });
+
+    let total = grid.dimensions.iter().try_fold(1_u64, |product, &size| product.checked_mul(u64::from(size)));
+    let total = total.filter(|&total| total < 1 << 31);
+    issues.check(total.is_some(), Code::VlmRange, "/grid/dimensions", || {
+        format!("{:?} has 2^31 cells or more", grid.dimensions)
+    });
+
+    let ascending = grid.cells.is_sorted_by(|a, b| a < b);
+    let inside = grid.cells.last().is_none_or(|&last| u64::from(last) < total.unwrap_or(0));
+    issues.check(ascending && inside, Code::VlmOrder, "/grid/cells", || {
+        String::from("not ascending, or outside of the grid")
+    });
+
+    let lengths_fit = grid.starts.len() == grid.cells.len() + 1;
+    issues.check(lengths_fit, Code::VlmLength, "/grid/starts", || {
+        format!("{} offsets for {} cells", grid.starts.len(), grid.cells.len())
+    });
+    check_starts(&grid.starts, grid.entries.len(), "/grid/starts", issues);
+    issues.check_all(&grid.entries, Code::VlmIndex, "/grid/entries", "there is no such light", |&light| {
+        (light as usize) < lights
+    });
+    let unsorted = |range: &[u32]| {
+        let list = grid.entries.get(range[0] as usize..range[1] as usize);
+        !list.is_none_or(|list| list.is_sorted_by(|a, b| a < b))
+    };
+    if let Some(cell) = grid.starts.windows(2).position(unsorted) {
+        issues.check(false, Code::VlmOrder, &format!("/grid/cells/{cell}"), || {
+            String::from("its lights are not ascending")
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::{Sample, Vlm};
+
+    /// Two lights of one node, one sample each, in a grid of one cell.
+    fn valid() -> VlmAsset {
+        let sample = Sample { position: Vec3::ZERO, normal: Vec3::Y, reflectance: Vec3::ONE };
+        VlmAsset {
+            vlms: vec![Vlm {
+                id: String::from("floor"),
+                node: 0,
+                lights: [0, 2],
+                vertices: [0, 4],
+                authored: false,
+            }],
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::X + Vec3::Z, Vec3::Z],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            albedo: vec![Vec3::ONE; 2],
+            sample_starts: vec![0, 1, 2],
+            samples: vec![sample; 2],
+            grid: Some(Grid {
+                origin: Vec3::ZERO,
+                cell_size: 1.0,
+                dimensions: [1, 1, 1],
+                cells: vec![0],
+                starts: vec![0, 2],
+                entries: vec![0, 1],
+            }),
+            ..VlmAsset::default()
+        }
+    }
+
+    fn grid(asset: &mut VlmAsset) -> &mut Grid {
+        asset.grid.as_mut().unwrap()
+    }
+
+    #[test]
+    fn a_valid_asset_has_no_issues() {
+        assert_eq!(validate(&valid()), []);
+    }
+
+    #[test]
+    fn every_broken_rule_is_seen() {
+        type Break = fn(&mut VlmAsset);
+        let cases: &[(Code, &str, Break)] = &[
+            (Code::VlmLength, "/albedo", |a| a.albedo.truncate(1)),
+            (Code::VlmLength, "/emission", |a| a.emission.push(Vec3::ONE)),
+            (Code::VlmLength, "/tags", |a| a.tags.push(1)),
+            (Code::VlmLength, "/sample_starts", |a| a.sample_starts.push(2)),
+            (Code::VlmRange, "/vlms", |a| a.positions.push(Vec3::ZERO)),
+            (Code::VlmRange, "/vlms/0/lights", |a| a.vlms[0].lights = [1, 1]),
+            (Code::VlmId, "/vlms/0", |a| a.vlms[0].id.clear()),
+            (Code::VlmIndex, "/triangles/1", |a| a.triangles[1][2] = 4),
+            (Code::VlmNumber, "/positions/3", |a| a.positions[3].x = f32::NAN),
+            (Code::VlmNumber, "/albedo/0", |a| a.albedo[0].y = f32::INFINITY),
+            (Code::VlmAspect, "/triangles/0", |a| a.triangles[0] = [0, 1, 1]),
+            (Code::VlmAspect, "/triangles/0", |a| a.positions[1] = Vec3::new(0.502, 0.0, 0.498)),
+            (Code::VlmNumber, "/samples/1", |a| a.samples[1].normal = Vec3::ZERO),
+            (Code::VlmOrder, "/sample_starts", |a| a.sample_starts = vec![0, 2, 1]),
+            (Code::VlmOrder, "/primitive_tags", |a| a.primitive_tags = vec![(0, 1, 1), (0, 0, 1)]),
+            (Code::VlmNumber, "/primitive_tags/0", |a| a.primitive_tags = vec![(0, 0, 0)]),
+            (Code::VlmNumber, "/settings", |a| a.settings.range = f32::NAN),
+            (Code::VlmNumber, "/grid", |a| grid(a).cell_size = 0.0),
+            (Code::VlmRange, "/grid/dimensions", |a| grid(a).dimensions = [1 << 16, 1 << 15, 1]),
+            (Code::VlmOrder, "/grid/cells", |a| grid(a).cells[0] = 1),
+            (Code::VlmLength, "/grid/starts", |a| grid(a).starts = vec![0, 0, 2]),
+            (Code::VlmOrder, "/grid/starts", |a| grid(a).starts[1] = 1),
+            (Code::VlmIndex, "/grid/entries/1", |a| grid(a).entries[1] = 2),
+            (Code::VlmOrder, "/grid/cells/0", |a| grid(a).entries = vec![1, 0]),
+        ];
+        for (code, pointer, spoil) in cases {
+            let mut asset = valid();
+            spoil(&mut asset);
+            let issues = validate(&asset);
+            assert!(
+                issues.iter().any(|issue| issue.code == *code && issue.pointer == *pointer),
+                "{} at {pointer} was not seen: {issues:?}",
+                code.as_str()
+            );
+        }
+    }
+}

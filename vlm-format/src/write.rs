@@ -1,0 +1,293 @@
+//! Writes a [`VlmAsset`] into a glTF file: patches the JSON, appends to the data, touches nothing else.
+
+use glam::Vec3;
+use serde_json::{Map, Value, json};
+
+use crate::asset::{Grid, Sample, VlmAsset};
+use crate::check::array;
+use crate::container::GltfFile;
+use crate::digest::{self, Source};
+use crate::error::{Code, Error, Issue};
+use crate::package::{OutputFile, Parts, Target};
+use crate::strip::{EXTENSION, strip};
+use crate::validate::validate;
+
+/// Adds Virtual Light Meshes to a file. Those that it has already are replaced.
+///
+/// Returns the files of the output, the main one first; nothing is written to disk, see [`crate::write_atomic`]. Every
+/// byte and JSON value of the input stays as it was. If the container changes, buffer 0 moves between the BIN chunk and
+/// a URI; all other URIs stay, and the files that they name are returned too.
+///
+/// # Errors
+/// [`Error::Asset`] if the asset breaks its invariants or names nodes or primitives that the file lacks;
+/// [`Error::Invalid`] if the geometry cannot be read or the output would be too large.
+pub fn write_vlm(file: &GltfFile, asset: &VlmAsset, target: &Target) -> Result<Vec<OutputFile>, Error> {
+    let mut issues = validate(asset);
+    issues.extend(check_references(file, asset));
+    if !issues.is_empty() {
+        return Err(Error::Asset { issues });
+    }
+    let mut parts = Parts::of(file);
+    strip(&mut parts);
+    parts.convert(file, target);
+    let mut extension = Arrays::new(&parts.json).extension(asset);
+    add_digests(&mut extension.json, file, asset)?;
+    extension.append_to(&mut parts, target);
+    refer(&mut parts.json, asset);
+    parts.pack(target)
+}
+
+/// Takes the Virtual Light Meshes out of a file, which is then as it was before [`write_vlm`].
+///
+/// # Errors
+/// [`Error::Invalid`] if the output would be too large.
+pub fn strip_vlm(file: &GltfFile, target: &Target) -> Result<Vec<OutputFile>, Error> {
+    let mut parts = Parts::of(file);
+    strip(&mut parts);
+    parts.convert(file, target);
+    parts.pack(target)
+}
+
+/// Nodes and primitives that the asset names exist.
+fn check_references(file: &GltfFile, asset: &VlmAsset) -> Vec<Issue> {
+    let (nodes, meshes) = (array(file.json(), "/nodes"), array(file.json(), "/meshes"));
+    let mut issues = Vec::new();
+    for (i, vlm) in asset.vlms.iter().enumerate() {
+        if vlm.node as usize >= nodes.len() {
+            issues.push(Issue::error(
+                Code::VlmNode,
+                format!("/vlms/{i}/node"),
+                format!("there is no node {}", vlm.node),
+            ));
+        }
+    }
+    for (i, (mesh, primitive, _)) in asset.primitive_tags.iter().enumerate() {
+        let primitives = meshes.get(*mesh as usize).map_or(&[][..], |mesh| array(mesh, "/primitives"));
+        if *primitive as usize >= primitives.len() {
+            let message = format!("there is no primitive {primitive} of mesh {mesh}");
+            issues.push(Issue::error(Code::VlmNode, format!("/primitive_tags/{i}"), message));
+        }
+    }
+    issues
+}
+
+/// The arrays of an asset on their way into one buffer view.
+struct Arrays {
+    bytes: Vec<u8>,
+    /// Accessors, to be appended to those of the file.
+    accessors: Vec<Value>,
+    first_accessor: usize,
+    view: usize,
+}
+
+/// The root object, and the data that it refers to.
+struct Extension {
+    json: Map<String, Value>,
+    arrays: Arrays,
+}
+
+impl Arrays {
+    fn new(root: &Value) -> Self {
+        Self {
+            bytes: Vec::new(),
+            accessors: Vec::new(),
+            first_accessor: array(root, "/accessors").len(),
+            view: array(root, "/bufferViews").len(),
+        }
+    }
+
+    fn extension(mut self, asset: &VlmAsset) -> Extension {
+        let mut json = Map::new();
+        json.insert(String::from("generator"), json!(asset.generator));
+        json.insert(String::from("settings"), serde_json::to_value(&asset.settings).unwrap_or_default());
+        json.insert(String::from("vlms"), asset.vlms.iter().map(vlm_json).collect());
+        json.insert(String::from("lights"), self.lights(asset));
+        json.insert(String::from("samples"), self.samples(asset));
+        if let Some(grid) = &asset.grid {
+            json.insert(String::from("grid"), self.grid(grid));
+        }
+        Extension { json, arrays: self }
+    }
+
+    fn lights(&mut self, asset: &VlmAsset) -> Value {
+        let mut json = Map::new();
+        self.vectors(&mut json, "positions", &asset.positions);
+        self.integers(&mut json, "indices", asset.triangles.as_flattened());
+        self.vectors(&mut json, "albedo", &asset.albedo);
+        self.vectors(&mut json, "emission", &asset.emission);
+        self.integers(&mut json, "tags", &asset.tags);
+        Value::Object(json)
+    }
+
+    fn samples(&mut self, asset: &VlmAsset) -> Value {
+        let column = |part: fn(&Sample) -> Vec3| asset.samples.iter().map(part).collect::<Vec<Vec3>>();
+        let mut json = Map::new();
+        self.integers(&mut json, "starts", &asset.sample_starts);
+        self.vectors(&mut json, "positions", &column(|sample| sample.position));
+        self.vectors(&mut json, "normals", &column(|sample| sample.normal));
+        self.vectors(&mut json, "reflectance", &column(|sample| sample.reflectance));
+        Value::Object(json)
+    }
+
+    fn grid(&mut self, grid: &Grid) -> Value {
+        let mut json = Map::new();
+        json.insert(String::from("origin"), json!(grid.origin.to_array()));
+        json.insert(String::from("cellSize"), json!(grid.cell_size));
+        json.insert(String::from("dimensions"), json!(grid.dimensions));
+        self.integers(&mut json, "cells", &grid.cells);
+        self.integers(&mut json, "starts", &grid.starts);
+        self.integers(&mut json, "entries", &grid.entries);
+        Value::Object(json)
+    }
+
+    fn vectors(&mut self, json: &mut Map<String, Value>, key: &str, values: &[Vec3]) {
+        let bytes: Vec<u8> =
+            values.iter().flat_map(|value| value.to_array()).flat_map(f32::to_le_bytes).collect();
+        self.push(json, key, "VEC3", 5126, values.len(), &bytes);
+    }
+
+    fn integers(&mut self, json: &mut Map<String, Value>, key: &str, values: &[u32]) {
+        let bytes: Vec<u8> = values.iter().copied().flat_map(u32::to_le_bytes).collect();
+        self.push(json, key, "SCALAR", 5125, values.len(), &bytes);
+    }
+
+    /// Adds an accessor. An empty array has none: glTF's accessors have one element at least.
+    fn push(
+        &mut self,
+        json: &mut Map<String, Value>,
+        key: &str,
+        kind: &str,
+        component: u32,
+        count: usize,
+        bytes: &[u8],
+    ) {
+        if count == 0 {
+            return;
+        }
+        let accessor = self.first_accessor + self.accessors.len();
+        json.insert(key.to_owned(), json!({ "accessor": accessor, "digest": digest::of_array(kind, bytes) }));
+        self.accessors.push(json!({
+            "bufferView": self.view,
+            "byteOffset": self.bytes.len(),
+            "componentType": component,
+            "count": count,
+            "type": kind,
+        }));
+        self.bytes.extend_from_slice(bytes);
+    }
+}
+
+fn vlm_json(vlm: &crate::asset::Vlm) -> Value {
+    let mut json = json!({ "id": vlm.id, "lights": vlm.lights, "vertices": vlm.vertices });
+    if vlm.authored {
+        json["authored"] = json!(true);
+    }
+    json
+}
+
+/// Digests of what the lights and the grid were made from.
+fn add_digests(extension: &mut Map<String, Value>, file: &GltfFile, asset: &VlmAsset) -> Result<(), Error> {
+    let mut source = Source::new(file);
+    let vlms = extension.get_mut("vlms").and_then(Value::as_array_mut);
+    for (json, vlm) in vlms.into_iter().flatten().zip(&asset.vlms) {
+        let node = vlm.node as usize;
+        json["digests"] = json!({ "geometry": source.geometry(node)?, "transform": source.transform(node)? });
+    }
+    if let Some(grid) = extension.get_mut("grid") {
+        grid["sceneDigest"] = json!(source.scene()?);
+    }
+    Ok(())
+}
+
+impl Extension {
+    /// Appends data, buffer view and accessors, and sets the root object.
+    fn append_to(mut self, parts: &mut Parts, target: &Target) {
+        let (view, byte_length) = (self.arrays.view, self.arrays.bytes.len());
+        let place = if parts.appends_to_bin() {
+            append_to_bin(parts, &self.arrays.bytes)
+        } else {
+            add_buffer(parts, std::mem::take(&mut self.arrays.bytes), target)
+        };
+        push(
+            &mut parts.json,
+            "bufferViews",
+            json!({
+                "buffer": place.buffer,
+                "byteOffset": place.offset,
+                "byteLength": byte_length,
+                "name": EXTENSION,
+            }),
+        );
+        for accessor in self.arrays.accessors {
+            push(&mut parts.json, "accessors", accessor);
+        }
+        self.json.insert(
+            String::from("data"),
+            json!({ "bufferView": view, "bufferByteLength": place.length_before }),
+        );
+        insert_extension(&mut parts.json, Value::Object(self.json));
+        push(&mut parts.json, "extensionsUsed", json!(EXTENSION));
+    }
+}
+
+/// Where the data went.
+struct Place {
+    buffer: usize,
+    offset: usize,
+    /// `byteLength` of the buffer before; 0 if it did not exist.
+    length_before: u64,
+}
+
+fn append_to_bin(parts: &mut Parts, bytes: &[u8]) -> Place {
+    let bin = parts.bin.get_or_insert_default();
+    bin.resize(bin.len().next_multiple_of(4), 0);
+    let offset = bin.len();
+    bin.extend_from_slice(bytes);
+    let length = json!(bin.len());
+    let length_before = match parts.json.pointer_mut("/buffers/0/byteLength") {
+        Some(known) => std::mem::replace(known, length).as_u64().unwrap_or(0),
+        None => {
+            push(&mut parts.json, "buffers", json!({ "byteLength": length }));
+            0
+        }
+    };
+    Place { buffer: 0, offset, length_before }
+}
+
+fn add_buffer(parts: &mut Parts, bytes: Vec<u8>, target: &Target) -> Place {
+    let buffer = array(&parts.json, "/buffers").len();
+    let byte_length = bytes.len();
+    let uri = parts.place(bytes, target, "vlm.bin");
+    push(&mut parts.json, "buffers", json!({ "byteLength": byte_length, "uri": uri }));
+    Place { buffer, offset: 0, length_before: 0 }
+}
+
+/// Marks the nodes that bear lights and the primitives that are tagged.
+fn refer(json: &mut Value, asset: &VlmAsset) {
+    for vlm in &asset.vlms {
+        if let Some(node) = json.pointer_mut(&format!("/nodes/{}", vlm.node)) {
+            insert_extension(node, json!({ "vlm": vlm.id }));
+        }
+    }
+    for (mesh, primitive, tag) in &asset.primitive_tags {
+        if let Some(primitive) = json.pointer_mut(&format!("/meshes/{mesh}/primitives/{primitive}")) {
+            insert_extension(primitive, json!({ "tag": tag }));
+        }
+    }
+}
+
+fn insert_extension(item: &mut Value, extension: Value) {
+    if let Value::Object(item) = item
+        && let Value::Object(extensions) = item.entry("extensions").or_insert_with(|| json!({}))
+    {
+        extensions.insert(EXTENSION.to_owned(), extension);
+    }
+}
+
+fn push(json: &mut Value, key: &str, item: Value) {
+    if let Value::Object(object) = json
+        && let Value::Array(list) = object.entry(key).or_insert_with(|| json!([]))
+    {
+        list.push(item);
+    }
+}
