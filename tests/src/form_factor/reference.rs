@@ -38,12 +38,14 @@ pub fn truths_around(case: &Case, step: f64) -> Vec<f64> {
     let Some(view) = View::new(case) else { return Vec::new() };
     let n = case.n.as_dvec3();
     let moves = [DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y, DVec3::Z, -DVec3::Z];
-    let step = step / case.size();
+    let step = step * view.scale;
     moves.map(|way| form_factor_of(view.corners.map(|r| r + way * step), view.edges, view.normal, n)).to_vec()
 }
 
 /// A case in units of the light's size, as seen from the receiver.
 struct View {
+    /// Units per metre.
+    scale: f64,
     corners: [DVec3; 3],
     edges: [DVec3; 3],
     normal: DVec3,
@@ -53,12 +55,13 @@ impl View {
     fn new(case: &Case) -> Option<Self> {
         let x = case.x.as_dvec3();
         let [v0, v1, v2] = case.corners.map(|v| v.as_dvec3());
-        let scale = 1.0 / case.size();
+        // A power of two rounds nothing.
+        let scale = (-case.size().log2().round()).exp2();
         let corners = [v0 - x, v1 - x, v2 - x].map(|r| r * scale);
         let (e1, e2) = ((v1 - v0) * scale, (v2 - v0) * scale);
         let normal = e1.cross(e2);
         let is_sound = normal.length() > 0.0 && corners.iter().all(|r| r.is_finite()) && case.n.is_finite();
-        is_sound.then_some(Self { corners, edges: [e1, e2 - e1, -e2], normal })
+        is_sound.then_some(Self { scale, corners, edges: [e1, e2 - e1, -e2], normal })
     }
 }
 
@@ -141,7 +144,9 @@ impl Part {
         let d01 = r.dot(r1);
         let (d20, d12) = (r.dot(r2), r1.dot(r2));
         let (w01, w12, w20) = (Weight::new(x1, d01), Weight::new(x12, d12), Weight::new(x2, d20));
-        if !(w01.is_far && w12.is_far && w20.is_far) {
+        // Next to a corner, differences of 1/r^2 are as large as what they come from.
+        let nearest = r.length().min(r1.length()).min(r2.length());
+        if !(w01.is_far && w12.is_far && w20.is_far && nearest > 0.25) {
             return w01.w * n.dot(x1) + w12.w * n.dot(x12) - w20.w * n.dot(x2);
         }
         let first = r1.dot(e2) / (d01 * d12) + (w01.excess - w12.excess);
@@ -176,7 +181,7 @@ fn arctangent_excess(t: f64) -> f64 {
         let y = t.sqrt();
         return y.atan() / y - 1.0;
     }
-    (1..=9).rev().fold(0.0, |sum, k| (1.0 / f64::from(2 * k + 1) - sum) * t) * -1.0
+    -(1..=9).rev().fold(0.0, |sum, k| (1.0 / f64::from(2 * k + 1) - sum) * t)
 }
 
 /// Enough for every light of aspect up to 100; a longer needle close by has its measure rounded to the coarser pieces.

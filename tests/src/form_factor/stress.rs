@@ -83,7 +83,7 @@ pub fn run(count: u64, evaluate: impl Fn(&[Case]) -> Vec<f32> + Sync) -> Report 
     (0..count.div_ceil(BATCH))
         .into_par_iter()
         .map(|batch| run_batch(batch * BATCH..((batch + 1) * BATCH).min(count), &evaluate))
-        .reduce(Report::default, Report::merge)
+        .reduce(Report::default, |all, more| all.merge(&more))
 }
 
 fn run_batch(indices: std::ops::Range<u64>, evaluate: &(impl Fn(&[Case]) -> Vec<f32> + Sync)) -> Report {
@@ -124,7 +124,7 @@ impl Report {
         }
     }
 
-    fn merge(mut self, other: Self) -> Self {
+    fn merge(mut self, other: &Self) -> Self {
         for (bin, more) in &other.bins {
             let errors = self.bins.entry(*bin).or_default();
             errors.of_uncosined.merge(&more.of_uncosined);

@@ -36,13 +36,13 @@ pub fn along<const FUSED: bool>(p: Vec3, t: f32, e: Vec3) -> Vec3 {
 /// err by 1e-7, which shows beside the rounding errors; degree 8 gains nothing in f32.
 #[inline(always)]
 pub fn arctangent_excess<const FUSED: bool>(t: f32) -> f32 {
-    let q = 0.002_974_605_23;
-    let q = mul_add::<FUSED>(q, t, -0.016_581_240_4);
-    let q = mul_add::<FUSED>(q, t, 0.043_553_626_7);
-    let q = mul_add::<FUSED>(q, t, -0.075_805_851_9);
-    let q = mul_add::<FUSED>(q, t, 0.106_789_434);
-    let q = mul_add::<FUSED>(q, t, -0.142_142_099);
-    let q = mul_add::<FUSED>(q, t, 0.199_941_373);
+    let q = 0.002_974_605_2;
+    let q = mul_add::<FUSED>(q, t, -0.016_581_241);
+    let q = mul_add::<FUSED>(q, t, 0.043_553_628);
+    let q = mul_add::<FUSED>(q, t, -0.075_805_85);
+    let q = mul_add::<FUSED>(q, t, 0.106_789_43);
+    let q = mul_add::<FUSED>(q, t, -0.142_142_1);
+    let q = mul_add::<FUSED>(q, t, 0.199_941_37);
     let q = mul_add::<FUSED>(q, t, -0.333_331_67);
     q * t
 }

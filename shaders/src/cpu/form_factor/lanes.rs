@@ -130,10 +130,10 @@ fn tile<const FUSED: bool>(light: &LightGeometry, blocks: &[Block], results: &mu
         let (far, is_close) = far_block::<FUSED>(light, block);
         results.copy_from_slice(&far[..results.len()]);
         if is_close != [0; LANES] {
-            for lane in 0..results.len() {
+            for (lane, &is_close) in is_close[..results.len()].iter().enumerate() {
                 // Branch-free append: the slot is overwritten unless the lane is close.
                 waiting[waiting_count] = (b * LANES + lane) as u16;
-                waiting_count += is_close[lane] as usize;
+                waiting_count += is_close as usize;
             }
         }
     }
