@@ -63,3 +63,50 @@ fn close<const FUSED: bool>(light: &LightGeometry, x: Vec3, n: Vec3, heights: &H
 fn to_unit(x: f32) -> f32 {
     if x > 0.0 { if x < 1.0 { x } else { 1.0 } } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use std::f64::consts::PI;
+
+    /// Two triangles that make the square `[-h, h]^2` at height `z`, shining down.
+    fn ceiling(h: f64, z: f64) -> [LightGeometry; 2] {
+        let [a, b, c, d] = [[-h, -h, z], [h, -h, z], [h, h, z], [-h, h, z]].map(DVec3::from);
+        [[a, c, b], [a, d, c]].map(LightGeometry::new)
+    }
+
+    /// The square seen from the point below its centre: four times the closed form of a corner.
+    fn square_above(h: f64, z: f64) -> f64 {
+        let x = h / z;
+        4.0 / PI * x / (1.0 + x * x).sqrt() * (x / (1.0 + x * x).sqrt()).atan()
+    }
+
+    #[test]
+    fn square_above_a_point_matches_the_closed_form() {
+        for (h, z) in [(1.0, 1.0), (0.5, 3.0), (0.125, 1000.0), (100.0, 0.25)] {
+            let sum: f32 = ceiling(h, z).iter().map(|light| form_factor(light, Vec3::ZERO, Vec3::Z)).sum();
+            let relative = f64::from(sum) / square_above(h, z) - 1.0;
+            assert!(relative.abs() < 1e-6, "{h} {z}: {relative}");
+        }
+    }
+
+    #[test]
+    fn one_sided() {
+        let [a, _] = ceiling(1.0, 1.0);
+        assert_eq!(form_factor(&a, Vec3::new(0.0, 0.0, 2.0), -Vec3::Z), 0.0, "behind the light");
+        assert_eq!(form_factor(&a, Vec3::ZERO, -Vec3::Z), 0.0, "below the horizon");
+        assert_eq!(form_factor(&a, Vec3::new(0.0, 0.0, 1.0), Vec3::Z), 0.0, "in its plane");
+    }
+
+    #[test]
+    fn half_a_wall_above_the_horizon_counts() {
+        let wall = |low: f64| {
+            let [a, b, c, d] = [[1.0, -2.0, low], [1.0, 2.0, low], [1.0, 2.0, 2.0], [1.0, -2.0, 2.0]];
+            let halves = [[a, c, b], [a, d, c]].map(|t| LightGeometry::new(t.map(DVec3::from)));
+            halves.iter().map(|light| form_factor(light, Vec3::ZERO, Vec3::Z)).sum::<f32>()
+        };
+        assert!((wall(-2.0) - wall(0.0)).abs() < 1e-6);
+        assert!(wall(0.0) > 0.1);
+    }
+}
