@@ -13,6 +13,7 @@ fn main() {
     println!("cargo::rerun-if-env-changed=VLM_ASSETS");
     println!("cargo::rerun-if-env-changed=VLM_REQUIRE_NPM");
     println!("cargo::rustc-env=VLM_ASSETS_FOLDER={}", assets.display());
+    find_vulkan();
     for (name, needed, promised) in [
         ("has_scenes", assets.join("scenes/sponza.glb"), false),
         ("has_corpus", assets.join("corpus/CORE.txt"), false),
@@ -23,5 +24,23 @@ fn main() {
         if promised || needed.exists() {
             println!("cargo::rustc-cfg={name}");
         }
+    }
+}
+
+/// A Vulkan driver's manifest is there, or `VLM_REQUIRE_GPU=1` promises one.
+fn find_vulkan() {
+    println!("cargo::rustc-check-cfg=cfg(has_vulkan)");
+    let named = ["VK_ICD_FILENAMES", "VK_DRIVER_FILES"].map(|name| {
+        println!("cargo::rerun-if-env-changed={name}");
+        env::var_os(name).is_some()
+    });
+    println!("cargo::rerun-if-env-changed=VLM_REQUIRE_GPU");
+    let promised = env::var_os("VLM_REQUIRE_GPU").is_some_and(|value| value == "1");
+    let found = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"].iter().any(|folder| {
+        println!("cargo::rerun-if-changed={folder}");
+        Path::new(folder).read_dir().is_ok_and(|mut entries| entries.next().is_some())
+    });
+    if promised || found || named.contains(&true) {
+        println!("cargo::rustc-cfg=has_vulkan");
     }
 }

@@ -2,3 +2,4 @@
 //! and is tested, without a GPU.
 
 pub mod cpu;
+pub mod wgsl;

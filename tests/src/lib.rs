@@ -6,4 +6,5 @@ pub mod cornell;
 pub mod sample_asset;
 pub mod scenes;
 pub mod metrics;
+pub mod form_factor;
 pub mod thesis;

@@ -256,7 +256,7 @@ mod tests {
     fn textbook_formula_agrees_where_single_precision_suffices() {
         for (x, n) in [(Vec3::new(0.3, 0.1, 2.0), -Vec3::Z), (Vec3::new(1.5, 0.0, 1.5), -Vec3::X)] {
             let (textbook, exact) = (textbook_form_factor(&light(), x, n), form_factor(&light(), x, n));
-            assert!(exact > 0.01 && (f64::from(textbook) / exact - 1.0).abs() < 1e-3, "{textbook} {exact}");
+            assert!(exact > 0.01 && (textbook / exact - 1.0).abs() < 1e-3, "{textbook} {exact}");
         }
         assert_eq!(textbook_form_factor(&light(), Vec3::ZERO, Vec3::Z), 0.0, "behind the light");
     }

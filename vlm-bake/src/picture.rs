@@ -1,11 +1,12 @@
 //! Renderings as files: PNG to look at, EXR to measure.
 
 use std::f32::consts::PI;
-use std::io::{Cursor, Write};
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 use image::{ImageFormat, Rgb, Rgb32FImage, RgbImage};
+use vlm_format::write_file;
 use vlm_shaders::cpu::resolve::{auto_exposure, encode_srgb, tone_map};
 
 use crate::gbuffer::GBuffer;
@@ -26,13 +27,8 @@ pub enum PictureError {
         source: image::ImageError,
     },
     /// The file could not be written.
-    #[error("{path}: could not be written: {source}; is the folder there, writable, and the disk not full?", path = path.display())]
-    Write {
-        /// The file that was to be written.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Write(#[from] vlm_format::Error),
 }
 
 /// Radiance that leaves each pixel's surface, nt: `L_e + albedo / pi * (direct + indirect irradiance)`.
@@ -63,7 +59,7 @@ pub fn write_png(rendering: &Rendering, path: &Path, exposure: Option<f32>) -> R
     let mut file = Cursor::new(Vec::new());
     let encoded = image.write_to(&mut file, ImageFormat::Png);
     encoded.map_err(|source| PictureError::Encode { path: path.to_owned(), source })?;
-    write_whole(path, file.get_ref())?;
+    write_file(path, file.get_ref())?;
     Ok(exposure)
 }
 
@@ -80,7 +76,7 @@ pub fn write_irradiance(rendering: &Rendering, path: &Path) -> Result<(), Pictur
     let mut file = Cursor::new(Vec::new());
     let encoded = image.write_to(&mut file, ImageFormat::OpenExr);
     encoded.map_err(|source| PictureError::Encode { path: path.to_owned(), source })?;
-    write_whole(path, file.get_ref())
+    Ok(write_file(path, file.get_ref())?)
 }
 
 /// Reads what [`write_irradiance`] wrote: width, height, and RGB rows from the top.
@@ -91,16 +87,6 @@ pub fn read_irradiance(path: &Path) -> Result<(u32, u32, Vec<Vec3>), image::Imag
     let image = image::open(path)?.into_rgb32f();
     let pixels = image.pixels().map(|&Rgb(rgb)| Vec3::from(rgb)).collect();
     Ok((image.width(), image.height(), pixels))
-}
-
-/// Writes beside the file, then renames: nobody ever sees half of it.
-fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), PictureError> {
-    let error = |source| PictureError::Write { path: path.to_owned(), source };
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(error)?;
-    file.write_all(bytes).map_err(error)?;
-    file.persist(path).map_err(|e| error(e.error))?;
-    Ok(())
 }
 
 #[cfg(test)]

@@ -27,7 +27,7 @@ pub use container::{GltfFile, Kind};
 pub use error::{Code, Error, Issue, Severity, Stale};
 pub use package::{Container, OutputFile, Target};
 pub use read::{read_vlm, read_vlm_unchecked};
-pub use save::write_atomic;
+pub use save::{write_atomic, write_file};
 pub use strip::EXTENSION;
 pub use validate::{MAX_ASPECT_RATIO, validate};
 pub use write::{strip_vlm, write_vlm};

@@ -27,6 +27,15 @@ pub fn write_atomic(outputs: &[OutputFile], folder: &Path) -> Result<(), Error> 
     pending.into_iter().try_for_each(Pending::rename)
 }
 
+/// Writes one file as [`write_atomic`] does.
+///
+/// # Errors
+/// [`Error::Io`] with the path and the operating system's reason.
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if has_content(path, bytes) { Ok(()) } else { Pending::write(path, bytes, folder)?.rename() }
+}
+
 fn has_content(path: &Path, bytes: &[u8]) -> bool {
     let same_size = fs::metadata(path).is_ok_and(|data| data.is_file() && data.len() == bytes.len() as u64);
     same_size && fs::read(path).is_ok_and(|found| found == bytes)

@@ -48,7 +48,7 @@ pub fn gather(
         gathered.pairs += 1;
         if !is_behind(geometry, receiver) {
             let form_factor = form_factor(geometry, receiver.position, receiver.normal);
-            gathered.irradiance += radiosity * form_factor as f32;
+            gathered.irradiance += radiosity * form_factor;
         }
     }
     gathered
@@ -56,9 +56,10 @@ pub fn gather(
 
 /// True if the whole light lies behind the receiver's surface.
 fn is_behind(light: &LightGeometry, receiver: &Receiver) -> bool {
-    let r0 = light.v0 - receiver.position;
+    let r0 = (light.v0 - receiver.position) * light.scale;
     let height = |r: Vec3| r.dot(receiver.geometric_normal);
-    height(r0) <= 0.0 && height(r0 + light.e1) <= 0.0 && height(r0 + light.e2) <= 0.0
+    let [e1, e2] = light.edges();
+    height(r0) <= 0.0 && height(r0 + e1) <= 0.0 && height(r0 + e2) <= 0.0
 }
 
 #[cfg(test)]

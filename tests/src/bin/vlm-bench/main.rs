@@ -5,6 +5,7 @@ mod render;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use vlm_tests::form_factor::command;
 
 #[derive(Parser)]
 #[command(name = "vlm-bench", version, about = "Measures Virtual Light Meshes against other methods")]
@@ -17,11 +18,20 @@ struct Cli {
 enum Command {
     /// Render a picture by any method, and compare it with a reference
     Render(render::RenderArgs),
+    /// Form factors of a file of cases, or the stress test
+    FormFactor(command::FormFactorArgs),
+    /// Measure the form factor's throughput on one core
+    Kernel(command::KernelArgs),
 }
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Render(args) => render::run(&args),
+        Command::FormFactor(args) => command::run(&args),
+        Command::Kernel(args) => {
+            command::run_kernel(&args);
+            Ok(())
+        }
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

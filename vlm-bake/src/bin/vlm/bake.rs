@@ -1,6 +1,5 @@
 //! `vlm bake`: a glTF in, the same glTF with its Virtual Light Meshes out.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -11,7 +10,7 @@ use vlm_bake::progress::Progress;
 use vlm_bake::render::{Method, RenderOptions, render};
 use vlm_bake::report::Report;
 use vlm_bake::scene::{LoadOptions, Scene, load};
-use vlm_format::{GltfFile, OutputFile, write_vlm};
+use vlm_format::{GltfFile, OutputFile, write_file, write_vlm};
 
 use crate::error::CliError;
 use crate::input::{is_pipe, open};
@@ -133,7 +132,7 @@ fn write_report(path: &Path, report: &Report) -> Result<(), CliError> {
         CliError::usage(format!("{}: the report was not written: {e}", path.display()))
     };
     let json = serde_json::to_string_pretty(report).map_err(|e| broken(&e))?;
-    fs::write(path, json + "\n").map_err(|e| broken(&e))
+    Ok(write_file(path, (json + "\n").as_bytes())?)
 }
 
 /// Renders the preview; returns lines that say what it shows.

@@ -1,0 +1,10 @@
+//! The shaders' source, put together from `wgsl/` and `wgsl/shared/`.
+
+/// Functions that other shaders use: the form factor.
+pub const FORM_FACTOR: &str = include_str!("../wgsl/shared/form_factor.wgsl");
+
+/// A compute shader that finds one form factor per case; entry point `main`, 64 invocations per workgroup.
+#[must_use]
+pub fn form_factor_cases() -> String {
+    format!("{FORM_FACTOR}\n{}", include_str!("../wgsl/form_factor_cases.wgsl"))
+}

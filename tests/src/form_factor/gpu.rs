@@ -1,0 +1,135 @@
+//! The form factor on a GPU: the WGSL shell over the same cases.
+
+use bytemuck::{Pod, Zeroable};
+use vlm_shaders::cpu::form_factor::LightGeometry;
+use vlm_shaders::wgsl;
+use wgpu::util::DeviceExt as _;
+
+use super::case::Case;
+
+/// Invocations per workgroup, as in the shader.
+const WORKGROUP: u32 = 64;
+
+/// Why there is nothing from the GPU.
+#[derive(Debug, thiserror::Error)]
+pub enum GpuError {
+    /// No Vulkan adapter, not even a software one.
+    #[error("no Vulkan adapter: install a driver (Debian: mesa-vulkan-drivers and libvulkan1): {0}")]
+    NoAdapter(String),
+    /// The adapter gives no device or lost it.
+    #[error("the GPU failed: {0}")]
+    Device(String),
+}
+
+/// A receiver, as the shader reads it.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Receiver {
+    x: [f32; 3],
+    n: [f32; 3],
+    padding: [f32; 2],
+}
+
+/// A device with the shader compiled.
+pub struct GpuFormFactor {
+    /// The adapter, in its driver's words.
+    pub name: String,
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    pipeline: wgpu::ComputePipeline,
+}
+
+impl GpuFormFactor {
+    /// Takes the first Vulkan adapter.
+    ///
+    /// # Errors
+    /// Where there is none or it gives no device.
+    pub fn new() -> Result<Self, GpuError> {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+        descriptor.backends = wgpu::Backends::VULKAN;
+        let instance = wgpu::Instance::new(descriptor);
+        let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))
+            .map_err(|error| GpuError::NoAdapter(error.to_string()))?;
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default()))
+            .map_err(|error| GpuError::Device(error.to_string()))?;
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("form_factor_cases"),
+            source: wgpu::ShaderSource::Wgsl(wgsl::form_factor_cases().into()),
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some("form_factor_cases"),
+            layout: None,
+            module: &module,
+            entry_point: Some("main"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            cache: None,
+        });
+        Ok(Self { name: adapter.get_info().name, device, queue, pipeline })
+    }
+
+    /// One form factor per case.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn evaluate(&self, cases: &[Case]) -> Result<Vec<f32>, GpuError> {
+        if cases.is_empty() {
+            return Ok(Vec::new());
+        }
+        let lights: Vec<LightGeometry> = cases.iter().map(Case::light).collect();
+        let receivers: Vec<Receiver> = cases
+            .iter()
+            .map(|case| Receiver { x: case.x.to_array(), n: case.n.to_array(), padding: [0.0; 2] })
+            .collect();
+        let size = 4 * cases.len() as u64;
+        let lights = self.input("lights", bytemuck::cast_slice(&lights));
+        let receivers = self.input("receivers", bytemuck::cast_slice(&receivers));
+        let results =
+            self.buffer("results", size, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
+        let back = self.buffer("back", size, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
+        let bindings = [&lights, &receivers, &results];
+        let entries: Vec<_> = (0..)
+            .zip(bindings)
+            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+            .collect();
+        let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &self.pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        });
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            pass.set_pipeline(&self.pipeline);
+            pass.set_bind_group(0, &group, &[]);
+            pass.dispatch_workgroups((cases.len() as u32).div_ceil(WORKGROUP), 1, 1);
+        }
+        encoder.copy_buffer_to_buffer(&results, 0, &back, 0, size);
+        self.queue.submit([encoder.finish()]);
+        self.read(&back)
+    }
+
+    fn input(&self, label: &str, contents: &[u8]) -> wgpu::Buffer {
+        let usage = wgpu::BufferUsages::STORAGE;
+        self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some(label),
+            contents,
+            usage,
+        })
+    }
+
+    fn buffer(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        let descriptor =
+            wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
+        self.device.create_buffer(&descriptor)
+    }
+
+    fn read(&self, buffer: &wgpu::Buffer) -> Result<Vec<f32>, GpuError> {
+        let failed = |error: &dyn std::fmt::Display| GpuError::Device(error.to_string());
+        buffer.map_async(wgpu::MapMode::Read, .., |_| {});
+        self.device
+            .poll(wgpu::PollType::Wait { submission_index: None, timeout: None })
+            .map_err(|error| failed(&error))?;
+        let mapped = buffer.get_mapped_range(..).map_err(|error| failed(&error))?;
+        Ok(bytemuck::cast_slice(&mapped).to_vec())
+    }
+}
