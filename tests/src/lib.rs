@@ -8,3 +8,4 @@ pub mod scenes;
 pub mod metrics;
 pub mod form_factor;
 pub mod thesis;
+pub mod pareto;
