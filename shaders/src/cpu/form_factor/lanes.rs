@@ -6,13 +6,11 @@
 //! again by blocks, so that neither branch costs the other's time.
 
 use glam::Vec3;
-use pulp::{Arch, NullaryFnOnce};
+use pulp::{Arch, Simd, WithSimd};
 
-use super::arithmetic::dot;
-use super::far::far_triangle;
 use super::light::LightGeometry;
-use super::near::Heights;
-use super::{close, far_form_factor};
+use super::real::{LaneMask, Lanes, Real, Vector};
+use super::{Seen, close_clipped, close_whole, form_factor};
 
 /// Receivers per block: one AVX-512 register, or two of AVX.
 pub const LANES: usize = 16;
@@ -37,8 +35,13 @@ impl Block {
 
     #[inline(always)]
     fn get(&self, lane: usize) -> (Vec3, Vec3) {
-        let at = |c: &[[f32; LANES]; 3]| Vec3::new(c[0][lane], c[1][lane], c[2][lane]);
-        (at(&self.x), at(&self.n))
+        let Self { x: [x0, x1, x2], n: [n0, n1, n2] } = self;
+        (Vec3::new(x0[lane], x1[lane], x2[lane]), Vec3::new(n0[lane], n1[lane], n2[lane]))
+    }
+
+    #[inline(always)]
+    fn load<S: Simd>(&self, simd: S, register: usize) -> (Vector<Lanes<S>>, Vector<Lanes<S>>) {
+        (load(simd, &self.x, register), load(simd, &self.n, register))
     }
 
     #[inline(always)]
@@ -81,100 +84,176 @@ impl Receivers {
     }
 }
 
-/// The form factor of `light` at each receiver, into `results`: [`super::form_factor`], several at a time.
+/// The form factor of `light` at each receiver, into `results`: [`form_factor`], several at a time.
 ///
-/// Where the processor has fused arithmetic the last bits differ from the scalar function's, by no more than the error
-/// of either; elsewhere they are the same. Results beyond the shorter of both are left as they are.
+/// With AVX2 and FMA or AVX-512 products and sums are fused, so the last bits differ from the scalar function's, by no
+/// more than the error of either; without, this is the scalar function. Results beyond the shorter of both are left as
+/// they are.
 pub fn form_factors(light: &LightGeometry, receivers: &Receivers, results: &mut [f32]) {
+    let batch = Batch { light, receivers, results };
     match Arch::new() {
-        #[cfg(target_arch = "x86_64")]
-        Arch::V4(simd) => simd.vectorize(Batch::<true> { light, receivers, results }),
-        #[cfg(target_arch = "x86_64")]
-        Arch::V3(simd) => simd.vectorize(Batch::<true> { light, receivers, results }),
-        _ => Batch::<false> { light, receivers, results }.call(),
+        Arch::Scalar => batch.one_by_one(),
+        #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+        arch => arch.dispatch(batch),
     }
 }
 
-/// [`form_factors`] without any instruction set beyond the target's own: the same bits as the scalar function.
-pub fn form_factors_portable(light: &LightGeometry, receivers: &Receivers, results: &mut [f32]) {
-    Batch::<false> { light, receivers, results }.call();
-}
-
-struct Batch<'a, const FUSED: bool> {
+struct Batch<'a> {
     light: &'a LightGeometry,
     receivers: &'a Receivers,
     results: &'a mut [f32],
 }
 
-impl<const FUSED: bool> NullaryFnOnce for Batch<'_, FUSED> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let count = self.receivers.len.min(self.results.len());
-        let tiles = self.receivers.blocks.chunks(TILE / LANES);
-        for (blocks, results) in tiles.zip(self.results[..count].chunks_mut(TILE)) {
-            tile::<FUSED>(self.light, blocks, results);
+impl Batch<'_> {
+    fn one_by_one(self) {
+        for (i, result) in self.results.iter_mut().take(self.receivers.len).enumerate() {
+            let (x, n) = self.receivers.blocks[i / LANES].get(i % LANES);
+            *result = form_factor(self.light, x, n);
         }
     }
 }
 
-/// Receivers per round of far lanes and close ones: what the list of close ones holds.
-const TILE: usize = 1024;
+impl WithSimd for Batch<'_> {
+    type Output = ();
 
-#[inline(always)]
-fn tile<const FUSED: bool>(light: &LightGeometry, blocks: &[Block], results: &mut [f32]) {
-    let mut waiting = [0u16; TILE];
-    let mut waiting_count = 0;
-    for (b, (block, results)) in blocks.iter().zip(results.chunks_mut(LANES)).enumerate() {
-        let (far, is_close) = far_block::<FUSED>(light, block);
-        results.copy_from_slice(&far[..results.len()]);
-        if is_close != [0; LANES] {
-            for (lane, &is_close) in is_close[..results.len()].iter().enumerate() {
-                // Branch-free append: the slot is overwritten unless the lane is close.
-                waiting[waiting_count] = (b * LANES + lane) as u16;
-                waiting_count += is_close as usize;
-            }
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let count = self.receivers.len.min(self.results.len());
+        let tiles = self.receivers.blocks.chunks(TILE / LANES);
+        for (blocks, results) in tiles.zip(self.results[..count].chunks_mut(TILE)) {
+            tile(simd, self.light, blocks, results);
         }
     }
-    for close in waiting[..waiting_count].chunks(LANES) {
+}
+
+/// Receivers per round of far lanes and close ones: what the lists of close ones hold.
+const TILE: usize = 1024;
+
+/// Receivers of a tile that wait for one of the slower forms.
+struct Waiting {
+    lanes: [u16; TILE],
+    count: usize,
+}
+
+impl Waiting {
+    const NONE: Self = Self { lanes: [0; TILE], count: 0 };
+
+    /// Branch-free: the slot is overwritten unless the lane waits.
+    #[inline(always)]
+    fn push(&mut self, lane: usize, waits: bool) {
+        self.lanes[self.count] = lane as u16;
+        self.count += usize::from(waits);
+    }
+}
+
+/// What [`far_block`] leaves to the slower forms.
+#[derive(Clone, Copy, Default)]
+struct Close {
+    whole: [f32; LANES],
+    one_above: [f32; LANES],
+    two_above: [f32; LANES],
+}
+
+#[inline(always)]
+fn tile<S: Simd>(simd: S, light: &LightGeometry, blocks: &[Block], results: &mut [f32]) {
+    let (mut whole, mut one_above, mut two_above) = (Waiting::NONE, Waiting::NONE, Waiting::NONE);
+    for (b, (block, results)) in blocks.iter().zip(results.chunks_mut(LANES)).enumerate() {
+        let mut far = [0.0; LANES];
+        let mut close = Close::default();
+        if far_block(simd, light, block, &mut far, &mut close) {
+            for lane in 0..results.len() {
+                let i = b * LANES + lane;
+                whole.push(i, close.whole[lane] > 0.0);
+                one_above.push(i, close.one_above[lane] > 0.0);
+                two_above.push(i, close.two_above[lane] > 0.0);
+            }
+        }
+        results.copy_from_slice(&far[..results.len()]);
+    }
+    finish::<S, true>(simd, light, &whole, blocks, results);
+    // Apart, as the second triangle of a quad is not evaluated for a register of triangles.
+    finish::<S, false>(simd, light, &one_above, blocks, results);
+    finish::<S, false>(simd, light, &two_above, blocks, results);
+}
+
+/// Evaluates the receivers that wait, a register at a time: lights wholly above the horizon, or cut by it.
+#[inline(always)]
+fn finish<S: Simd, const IS_WHOLE: bool>(
+    simd: S,
+    light: &LightGeometry,
+    waiting: &Waiting,
+    blocks: &[Block],
+    results: &mut [f32],
+) {
+    for lanes in waiting.lanes[..waiting.count].chunks(LANES) {
         let mut block = Block::EMPTY;
-        for (lane, &i) in close.iter().enumerate() {
+        for (lane, &i) in lanes.iter().enumerate() {
             let (x, n) = blocks[i as usize / LANES].get(i as usize % LANES);
             block.set(lane, x, n);
         }
-        let values = close_block::<FUSED>(light, &block);
-        for (&i, value) in close.iter().zip(values) {
+        let mut values = [0.0; LANES];
+        for register in 0..registers::<S>().min(lanes.len().div_ceil(S::F32_LANES)) {
+            let (x, n) = block.load(simd, register);
+            let form_factor = if IS_WHOLE { close_whole(light, x, n) } else { close_clipped(light, x, n) };
+            store(&mut values, register, form_factor);
+        }
+        for (&i, value) in lanes.iter().zip(values) {
             results[i as usize] = value;
         }
     }
 }
 
-/// [`far_triangle`] for each lane, and which lanes it cannot serve.
+/// The far form of every lane, 0 where there is no light, and which lanes need another form; true if any does.
 #[inline(always)]
-fn far_block<const FUSED: bool>(light: &LightGeometry, block: &Block) -> ([f32; LANES], [u32; LANES]) {
-    let mut results = [0.0; LANES];
-    let mut is_close = [0; LANES];
-    for lane in 0..LANES {
-        let (x, n) = block.get(lane);
-        let r = (light.v0 - x) * light.scale;
-        let heights = Heights::new::<FUSED>(light, r, n);
-        let is_lit = (dot::<FUSED>(light.normal, r) < 0.0) & heights.any_above();
-        let (sum, is_far) = far_triangle::<FUSED>(light, r, n);
-        let by_far = is_far & heights.all_above();
-        results[lane] = if is_lit & by_far { far_form_factor(sum) } else { 0.0 };
-        is_close[lane] = u32::from(is_lit & !by_far);
+fn far_block<S: Simd>(
+    simd: S,
+    light: &LightGeometry,
+    block: &Block,
+    far: &mut [f32; LANES],
+    close: &mut Close,
+) -> bool {
+    let mut any = false;
+    for register in 0..registers::<S>() {
+        let (x, n) = block.load(simd, register);
+        let seen = Seen::new(light, x, n);
+        let (result, is_far) = seen.far(light, n);
+        let zero = result.zero();
+        let above = seen.heights.all_above();
+        store(far, register, Real::select(seen.is_lit & above & is_far, result, zero));
+        let is_close: LaneMask<S> = seen.is_lit & !(above & is_far);
+        if zero.any(is_close) {
+            any = true;
+            let two = seen.heights.two_above();
+            store(&mut close.whole, register, flag(zero, is_close & above));
+            store(&mut close.one_above, register, flag(zero, is_close & !two & !above));
+            store(&mut close.two_above, register, flag(zero, is_close & two));
+        }
     }
-    (results, is_close)
+    any
+}
+
+/// Registers per block.
+#[inline(always)]
+fn registers<S: Simd>() -> usize {
+    LANES / S::F32_LANES
 }
 
 #[inline(always)]
-fn close_block<const FUSED: bool>(light: &LightGeometry, block: &Block) -> [f32; LANES] {
-    let mut results = [0.0; LANES];
-    for (lane, result) in results.iter_mut().enumerate() {
-        let (x, n) = block.get(lane);
-        let heights = Heights::new::<FUSED>(light, (light.v0 - x) * light.scale, n);
-        *result = close::<FUSED>(light, x, n, &heights);
+fn load<S: Simd>(simd: S, [x, y, z]: &[[f32; LANES]; 3], register: usize) -> Vector<Lanes<S>> {
+    Vector {
+        x: Lanes { simd, values: S::as_simd_f32s(x).0[register] },
+        y: Lanes { simd, values: S::as_simd_f32s(y).0[register] },
+        z: Lanes { simd, values: S::as_simd_f32s(z).0[register] },
     }
-    results
+}
+
+#[inline(always)]
+fn store<S: Simd>(values: &mut [f32; LANES], register: usize, lanes: Lanes<S>) {
+    S::as_mut_simd_f32s(values).0[register] = lanes.values;
+}
+
+/// 1 where the mask is set.
+#[inline(always)]
+fn flag<R: Real>(kind: R, mask: R::Mask) -> R {
+    R::select(mask, kind.one(), kind.zero())
 }

@@ -33,12 +33,12 @@ pub struct LightGeometry {
     /// Second corner, metres, world space. Receivers that nearly touch a corner need it as it is: a sum of edges would be
     /// rounded to the first corner's distance.
     pub v1: Vec3,
-    /// Not used.
-    pub padding_1: f32,
+    /// `base . base`.
+    pub base_squared: f32,
     /// Third corner, metres, world space.
     pub v2: Vec3,
     /// Not used.
-    pub padding_2: f32,
+    pub padding: f32,
 }
 
 impl LightGeometry {
@@ -68,9 +68,9 @@ impl LightGeometry {
             normal: e1.cross(e2).as_vec3(),
             altitude_squared: altitude.length_squared() as f32,
             v1: v1.as_vec3(),
-            padding_1: 0.0,
+            base_squared: base_squared as f32,
             v2: v2.as_vec3(),
-            padding_2: 0.0,
+            padding: 0.0,
         }
     }
 

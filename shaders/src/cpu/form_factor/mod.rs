@@ -5,9 +5,11 @@
 //!
 //! Within about `1e-5 r` of the light's plane, `r` the distance to it, F jumps between 0 and its value in front.
 
-mod arithmetic;
+mod real;
+mod arctangent;
 mod light;
 mod far;
+mod clip;
 mod near;
 mod lanes;
 mod moments;
@@ -16,13 +18,14 @@ use std::f32::consts::{FRAC_1_PI, TAU};
 
 use glam::Vec3;
 
-pub use lanes::{Receivers, form_factors, form_factors_portable};
+pub use lanes::{Receivers, form_factors};
 pub use light::LightGeometry;
 pub use moments::{ErrorBound, centroid_form_factor, form_factor_within, second_moment_form_factor};
 
-use arithmetic::dot;
+use clip::{Heights, clip_at_horizon};
 use far::far_triangle;
-use near::{Heights, clip_at_horizon, polygon_sum};
+use near::{polygon_sum, whole_sum};
+use real::{Real, Vector};
 
 /// The form factor of `light` at the point `x` with unit normal `n`, 0 to 1: irradiance per radiosity.
 ///
@@ -30,38 +33,76 @@ use near::{Heights, clip_at_horizon, polygon_sum};
 /// 0 to 1. NaN in any input gives 0.
 #[must_use]
 pub fn form_factor(light: &LightGeometry, x: Vec3, n: Vec3) -> f32 {
-    exact::<false>(light, x, n)
-}
-
-/// [`form_factor`], with or without fused arithmetic.
-#[inline(always)]
-fn exact<const FUSED: bool>(light: &LightGeometry, x: Vec3, n: Vec3) -> f32 {
-    let r = (light.v0 - x) * light.scale;
-    let heights = Heights::new::<FUSED>(light, r, n);
-    if !(dot::<FUSED>(light.normal, r) < 0.0 && heights.any_above()) {
+    let (x, n) = (Vector::from(x), Vector::from(n));
+    let seen = Seen::new(light, x, n);
+    if !seen.is_lit {
         return 0.0;
     }
-    let (sum, is_far) = far_triangle::<FUSED>(light, r, n);
-    if is_far && heights.all_above() { far_form_factor(sum) } else { close::<FUSED>(light, x, n, &heights) }
+    if seen.heights.all_above() {
+        let (result, is_far) = seen.far(light, n);
+        if is_far { result } else { close_whole(light, x, n) }
+    } else {
+        close_clipped(light, x, n)
+    }
 }
 
-#[inline(always)]
-fn far_form_factor(sum: f32) -> f32 {
-    to_unit(sum * -(1.0 / TAU))
+/// A light as seen from a point.
+struct Seen<R: Real> {
+    /// First corner, light units.
+    r: Vector<R>,
+    /// `N . r`: negative in front.
+    normal_r: R,
+    heights: Heights<R>,
+    /// In front of the light, which is not wholly below the horizon.
+    is_lit: R::Mask,
 }
 
-/// What [`far_triangle`] cannot: lights near the point or across its horizon.
+impl<R: Real> Seen<R> {
+    #[inline(always)]
+    fn new(light: &LightGeometry, x: Vector<R>, n: Vector<R>) -> Self {
+        let r = (x.splat(light.v0) - x) * x.x.splat(light.scale);
+        let normal_r = r.splat(light.normal).dot(r);
+        let heights = Heights::new(light, r, n);
+        let is_lit = normal_r.below(normal_r.zero()) & heights.any_above();
+        Self { r, normal_r, heights, is_lit }
+    }
+
+    /// The form factor of a light wholly above the horizon, and whether it is far enough for that.
+    #[inline(always)]
+    fn far(&self, light: &LightGeometry, n: Vector<R>) -> (R, R::Mask) {
+        let (sum, is_far) = far_triangle(light, self.r, n, self.heights.corners[0], self.normal_r);
+        (to_unit(sum * sum.splat(-1.0 / TAU)), is_far)
+    }
+}
+
+/// A light near the point, wholly above its horizon.
 #[inline(always)]
-fn close<const FUSED: bool>(light: &LightGeometry, x: Vec3, n: Vec3, heights: &Heights) -> f32 {
-    let corners = light.corners().map(|v| (v - x) * light.scale);
-    let polygon = clip_at_horizon::<FUSED>(light, corners, heights);
-    to_unit(polygon_sum::<FUSED>(&polygon, n, dot::<FUSED>(n, light.normal)) * -FRAC_1_PI)
+fn close_whole<R: Real>(light: &LightGeometry, x: Vector<R>, n: Vector<R>) -> R {
+    let sum = whole_sum(light, corners_from(light, x), n);
+    to_unit(sum * sum.splat(-FRAC_1_PI))
+}
+
+/// A light across the point's horizon.
+#[inline(always)]
+fn close_clipped<R: Real>(light: &LightGeometry, x: Vector<R>, n: Vector<R>) -> R {
+    let corners = corners_from(light, x);
+    let polygon = clip_at_horizon(light, corners, &Heights::new(light, corners[0], n));
+    let sum = polygon_sum(light, &polygon, n);
+    to_unit(sum * sum.splat(-FRAC_1_PI))
+}
+
+/// The corners as seen from `x`, light units, each rounded to its own distance.
+#[inline(always)]
+fn corners_from<R: Real>(light: &LightGeometry, x: Vector<R>) -> [Vector<R>; 3] {
+    let scale = x.x.splat(light.scale);
+    let from_x = [x.splat(light.v0) - x, x.splat(light.v1) - x, x.splat(light.v2) - x];
+    [from_x[0] * scale, from_x[1] * scale, from_x[2] * scale]
 }
 
 /// 0 to 1; 0 for NaN.
 #[inline(always)]
-fn to_unit(x: f32) -> f32 {
-    if x > 0.0 { if x < 1.0 { x } else { 1.0 } } else { 0.0 }
+fn to_unit<R: Real>(x: R) -> R {
+    R::select(x.is_above(), R::select(x.below(x.one()), x, x.one()), x.zero())
 }
 
 #[cfg(test)]

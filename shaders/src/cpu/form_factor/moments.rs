@@ -13,9 +13,8 @@ use std::f32::consts::TAU;
 
 use glam::Vec3;
 
-use super::arithmetic::{along, dot};
 use super::light::LightGeometry;
-use super::{exact, to_unit};
+use super::{form_factor, to_unit};
 
 /// Error of the centroid form over `tau^2` and of the second moment over `tau^3`, as shares of the uncosined form factor:
 /// upper bounds over the stress test's cases. Lower values would choose the cheap forms sooner and break the promise.
@@ -53,7 +52,7 @@ pub fn form_factor_within(light: &LightGeometry, x: Vec3, n: Vec3, bound: &Error
     let cheap = if exact_share >= 1.0 { 0.0 } else { cheap_form_factor(light, n, &seen, bound) };
     if exact_share > 0.0 {
         let share = exact_share.min(1.0);
-        to_unit(cheap + share * (exact::<false>(light, x, n) - cheap))
+        to_unit(cheap + share * (form_factor(light, x, n) - cheap))
     } else {
         to_unit(cheap)
     }
@@ -97,15 +96,14 @@ impl Centroid {
     fn new(light: &LightGeometry, x: Vec3, n: Vec3) -> Self {
         let r = (light.v0 - x) * light.scale;
         let slide = (light.after - light.before) / 3.0;
-        let c = along::<false>(along::<false>(r, 2.0 / 3.0, light.altitude), slide, light.base);
-        let inverse_square = 1.0 / dot::<false>(c, c);
-        let base_squared = dot::<false>(light.base, light.base);
+        let c = r + light.altitude * (2.0 / 3.0) + light.base * slide;
+        let inverse_square = 1.0 / c.dot(c);
         Self {
             c,
-            n_c: dot::<false>(n, c),
-            facing: (-dot::<false>(light.normal, r)).max(0.0),
+            n_c: n.dot(c),
+            facing: (-light.normal.dot(r)).max(0.0),
             inverse_square,
-            tau_squared: base_squared * inverse_square,
+            tau_squared: light.base_squared * inverse_square,
         }
     }
 
@@ -122,10 +120,10 @@ impl Centroid {
     }
 
     fn second_moment(&self, light: &LightGeometry, n: Vec3) -> f32 {
-        let skew = along::<false>(light.altitude, 0.5 * (light.after - light.before), light.base);
-        let (c_h, c_a) = (dot::<false>(self.c, skew), dot::<false>(self.c, light.base));
-        let (n_h, n_a) = (dot::<false>(n, skew), dot::<false>(n, light.base));
-        let trace = (dot::<false>(skew, skew) + 0.75 * dot::<false>(light.base, light.base)) / 18.0;
+        let skew = light.altitude + light.base * (0.5 * (light.after - light.before));
+        let (c_h, c_a) = (self.c.dot(skew), self.c.dot(light.base));
+        let (n_h, n_a) = (n.dot(skew), n.dot(light.base));
+        let trace = (skew.dot(skew) + 0.75 * light.base_squared) / 18.0;
         let c_cov_c = (c_h * c_h + 0.75 * c_a * c_a) / 18.0;
         let n_cov_c = (n_h * c_h + 0.75 * n_a * c_a) / 18.0;
         let i = self.inverse_square;

@@ -1,238 +1,319 @@
-//! What is close to the point or crosses its horizon: the triangle clipped to a polygon of up to four edges.
+//! What is close to the point or crosses its horizon: the whole light, or the one or two triangles that
+//! [`super::clip`] leaves of it.
 
 use std::f32::consts::FRAC_PI_2;
 
-use glam::Vec3;
-
-use super::arithmetic::{along, arctangent_excess, cross, dot, mul_add};
+use super::arctangent::{arctangent_excess, excess_and_slope};
+use super::clip::Polygon;
 use super::light::LightGeometry;
+use super::real::{Real, Vector, turn};
 
 /// Keeps quotients finite where a corner or an edge meets the point; far below anything that f32 resolves there.
 const TINY: f32 = 1e-30;
 
-/// Least distance of a corner, light units, for the sum by differences: closer, `1 / r^2` differs so much from corner to
-/// corner that the differences are no smaller than what they come from. More leaves thin lights to the plain sum's
-/// cancellation.
-const NEAREST_BY_DIFFERENCES: f32 = 0.25;
+/// Least square of the distance to a corner, over altitude times base and the sine of the corner's angle, for the sum by
+/// differences: closer, weights differ so much from corner to corner that their differences are no smaller than what they
+/// come from. Higher values leave thin triangles to the plain sum's cancellation, lower ones compact triangles to that of
+/// large weights.
+const NEAREST_OVER_AREA: f32 = 0.3;
 
-/// Up to four corners as seen from the point, and the edges between them: exact to their own length, not to that of
-/// the corners.
-#[derive(Clone, Copy, Debug)]
-pub struct Polygon {
-    /// Corner `i`; the last two agree in a triangle. Light units.
-    pub corners: [Vec3; 4],
-    /// From corner `i` to the next; the third is 0 in a triangle. Light units.
-    pub edges: [Vec3; 4],
-    /// Its area over the triangle's.
-    pub share: f32,
-    /// True for four corners.
-    pub is_quad: bool,
+/// How far beyond 1 the arctangent's fit may be used: the edges of a thin triangle seen under nearly 90 degrees lie on
+/// either side of it. The fit errs by 1e-7 there.
+const GREATEST_ARGUMENT: f32 = 1.03;
+
+/// `-pi F` of a whole light above the horizon; `corners` are the light's, light units.
+///
+/// By differences where they are good, else the plain sum over the edges: so close that nothing cancels.
+#[inline(always)]
+pub fn whole_sum<R: Real>(light: &LightGeometry, corners: [Vector<R>; 3], n: Vector<R>) -> R {
+    let triangle = Triangle::whole(light, corners);
+    let (sum, is_good) = triangle.sum(n);
+    if !sum.any(!is_good) {
+        return sum;
+    }
+    let [e01, e02] = light.edges();
+    let edges = [n.splat(e01), triangle.base, -n.splat(e02)];
+    let never = sum.below(sum);
+    R::select(is_good, sum, plain_sum(corners, edges, [never; 3], n))
 }
 
-/// How the light lies to the point's horizon, light units.
-#[derive(Clone, Copy, Debug)]
-pub struct Heights {
-    /// Of the three corners.
-    pub corners: [f32; 3],
-    /// Along the three edges. Their sum is 0 to their own precision, not to that of the edges: all come from the rises
-    /// along the base and the altitude. Cuts through a nearly level light would not close otherwise.
-    pub rises: [f32; 3],
+/// `-pi F` of what the horizon leaves of a light.
+#[inline(always)]
+pub fn polygon_sum<R: Real>(light: &LightGeometry, polygon: &Polygon<R>, n: Vector<R>) -> R {
+    let [q0, q1, q2, q3] = polygon.corners;
+    let [e0, e1, e2, e3] = polygon.edges;
+    let is_quad = polygon.is_quad;
+    let diagonal = e0 + e1;
+    let last = Vector::select(is_quad, -diagonal, e3);
+    let first = Triangle::part(light, [q0, q1, q2], [e0, e1, last], polygon.shares[0]);
+    let (mut sum, mut is_good) = first.sum(n);
+    if sum.any(is_quad) {
+        let second = Triangle::part(light, [q0, q2, q3], [diagonal, e2, e3], polygon.shares[1]);
+        let (sum_2, is_good_2) = second.sum(n);
+        sum = sum + R::select(is_quad, sum_2, sum.zero());
+        is_good = is_good & (is_good_2 | !is_quad);
+    }
+    if !sum.any(!is_good) {
+        return sum;
+    }
+    R::select(is_good, sum, plain_sum(polygon.corners, polygon.edges, polygon.is_horizon, n))
 }
 
-impl Heights {
-    /// Seen from the origin, the light's first corner at `r`.
+/// A triangle above the horizon, by base and altitude as [`LightGeometry`], light units.
+#[derive(Clone, Copy, Debug)]
+struct Triangle<R: Real> {
+    /// As seen from the point; the first lies opposite the base.
+    corners: [Vector<R>; 3],
+    base: Vector<R>,
+    before: R,
+    altitude: Vector<R>,
+    after: R,
+    normal: Vector<R>,
+    base_squared: R,
+}
+
+impl<R: Real> Triangle<R> {
     #[inline(always)]
-    pub fn new<const FUSED: bool>(light: &LightGeometry, r: Vec3, n: Vec3) -> Self {
-        let first = dot::<FUSED>(n, r);
-        let along_base = dot::<FUSED>(n, light.base);
-        let along_altitude = dot::<FUSED>(n, light.altitude);
-        let to_second = mul_add::<FUSED>(-light.before, along_base, along_altitude);
-        let to_third = mul_add::<FUSED>(light.after, along_base, along_altitude);
+    fn whole(light: &LightGeometry, corners: [Vector<R>; 3]) -> Self {
+        let r = corners[0];
         Self {
-            corners: [first, first + to_second, first + to_third],
-            rises: [to_second, along_base, -to_third],
+            corners,
+            base: r.splat(light.base),
+            before: r.x.splat(light.before),
+            altitude: r.splat(light.altitude),
+            after: r.x.splat(light.after),
+            normal: r.splat(light.normal),
+            base_squared: r.x.splat(light.base_squared),
         }
     }
 
-    /// All corners above the horizon.
+    /// `edges` run from each corner to the next; `share` is its area over the light's.
+    ///
+    /// The altitude comes from the area and not from the edges, whose long sides would leave it no digits.
     #[inline(always)]
-    pub fn all_above(&self) -> bool {
-        let [z0, z1, z2] = self.corners;
-        (z0 > 0.0) & (z1 > 0.0) & (z2 > 0.0)
+    fn part(light: &LightGeometry, corners: [Vector<R>; 3], edges: [Vector<R>; 3], share: R) -> Self {
+        let [e0, e1, e2] = edges;
+        let (l0, l1, l2) = (e0.dot(e0), e1.dot(e1), e2.dot(e2));
+        let base_is_2 = l0.below(l2) & l1.below(l2);
+        let base_is_1 = !base_is_2 & l0.below(l1);
+        let which = [base_is_1, base_is_2];
+        let [base, to_apex, from_apex] = Vector::turn(which, edges);
+        let [before, after, apex] = Vector::turn(which, corners);
+        let [base_squared, _, _] = turn(which, [l0, l1, l2]);
+        let inverse = share.one() / base_squared.at_least(TINY);
+        let normal = base.splat(light.normal) * share;
+        Self {
+            corners: [apex, before, after],
+            base,
+            before: -from_apex.dot(base) * inverse,
+            altitude: base.cross(normal) * inverse,
+            after: -to_apex.dot(base) * inverse,
+            normal,
+            base_squared,
+        }
     }
 
-    /// At least one corner above the horizon.
+    /// `-pi F`, and whether it is any good.
+    ///
+    /// [`super::far::far_triangle`] without the cosines' product and by half angles, which reach twice as far:
+    /// `W = w/2 = atan(|c| / k) / |c|` with `k = |r_i| |r_j| + r_i . r_j`. With `f = r + h` the foot of the altitude and
+    /// `W12 = p W1f + q Wf2`,
+    /// ```text
+    /// S/2 = n.N W12 + n.H (W01 - W20) + n.A (p (W1f - W01) + q (Wf2 - W20))
+    /// ```
     #[inline(always)]
-    pub fn any_above(&self) -> bool {
-        let [z0, z1, z2] = self.corners;
-        (z0 > 0.0) | (z1 > 0.0) | (z2 > 0.0)
+    fn sum(&self, n: Vector<R>) -> (R, R::Mask) {
+        let Self { corners: [r0, r1, r2], base, before: p, altitude, after: q, normal, base_squared } = *self;
+        let foot = r0 + altitude;
+        let squares = [r0.dot(r0), r1.dot(r1), r2.dot(r2)];
+        let lengths = [squares[0].root(), squares[1].root(), squares[2].root()];
+        let foot_square = foot.dot(foot);
+        let foot_length = foot_square.root();
+        let r_base = r0.cross(base);
+        let r_altitude = r0.cross(altitude);
+        let apex = Apex {
+            r: r0,
+            length: lengths[0],
+            // |f| - |r|
+            stretch: altitude.dot(foot + r0) / (foot_length + lengths[0]).at_least(TINY),
+            altitude,
+            base,
+            r_altitude,
+            foot_base: r_base + normal,
+            normal,
+        };
+        let area = (altitude.dot(altitude) * base_squared).root();
+        let reach = area * area.splat(NEAREST_OVER_AREA);
+        let half_1 = apex.half(r1, lengths[1], -p, reach);
+        let half_2 = apex.half(r2, lengths[2], q, reach);
+
+        // k20 - k01 = |r| (|r2| - |r1|) + r.a
+        let spread = base.dot(r1 + r2) / (lengths[1] + lengths[2]).at_least(TINY);
+        let k_step = lengths[0].times_plus(spread, r0.dot(base));
+        let by_difference =
+            (k_step * half_1.inverse).times_plus(half_2.inverse, half_1.excess - half_2.excess);
+        let across =
+            R::select(half_1.is_small & half_2.is_small, by_difference, half_1.weight - half_2.weight);
+        let steps = p.times_plus(half_1.step, q * half_2.step);
+        let along_base = p.times_plus(half_1.weight, q.times_plus(half_2.weight, steps));
+
+        let tail = n.dot(r_altitude).times_plus(across, n.dot(r_base) * steps);
+        let sum = n.dot(normal).times_plus(along_base, tail);
+        let is_far = reach.below(squares[0])
+            & (reach * half_1.sine).below(squares[1])
+            & (reach * half_2.sine).below(squares[2]);
+        let is_far = is_far & reach.below(foot_square);
+        (sum, is_far & half_1.is_good & half_2.is_good)
     }
 }
 
-/// The part of the light above the horizon; `r` are its corners in light units, of which one at least is above the
-/// horizon.
+/// What both halves of a triangle share.
+struct Apex<R: Real> {
+    r: Vector<R>,
+    length: R,
+    /// `|f| - |r|`.
+    stretch: R,
+    altitude: Vector<R>,
+    base: Vector<R>,
+    r_altitude: Vector<R>,
+    /// `f x a = r x a + N`.
+    foot_base: Vector<R>,
+    normal: Vector<R>,
+}
+
+/// The edge from the apex to one end of the base.
+struct Half<R: Real> {
+    /// `W = w/2` of the edge.
+    weight: R,
+    /// `W` of the part of the base from its end to the foot, less `weight`.
+    step: R,
+    /// `1/k` of the edge, where `is_small`.
+    inverse: R,
+    /// `W - 1/k` of the edge, where `is_small`.
+    excess: R,
+    /// Sine of the triangle's angle at the base's end.
+    sine: R,
+    /// Both angles are at most 90 degrees.
+    is_small: R::Mask,
+    /// Both arguments lie within the arctangent's fit.
+    is_good: R::Mask,
+}
+
+impl<R: Real> Apex<R> {
+    /// `end` is the base's end at `foot + share base`.
+    ///
+    /// With `c = r x end = H + m A`, `c_f = f x end = m (A + N)` and `m = share`,
+    /// ```text
+    /// k_f - k = |end| (|f| - |r|) + end.h        |c_f|^2 - |c|^2 = (m N - H) . (c_f + c)
+    /// up to 90 degrees   W = (1 + g(t)) i,               i = 1/k,       t = |c|^2 i^2
+    /// above              W = pi / (2 |c|) - (1 + g(t)) i,  i = k / |c|^2,  t = k i
+    /// ```
+    #[inline(always)]
+    fn half(&self, end: Vector<R>, end_length: R, share: R, reach: R) -> Half<R> {
+        let k_step = end_length.times_plus(self.stretch, end.dot(self.altitude));
+        let edge = self.altitude.along(share, self.base);
+        // From the nearer end, as the other would leave it no digits.
+        let c = Vector::select(self.length.below(end_length), self.r, end).cross(edge);
+        let c_foot = self.foot_base * share;
+        let c_foot_edge = share * share * self.base.dot(self.base);
+        let s = c.dot(c);
+        let s_step = (self.normal * share - self.r_altitude).dot(c_foot + c);
+        let k = half_angle_k(s, self.length * end_length, self.r.dot(end));
+        let (k_foot, s_foot) = ((k + k_step).at_least(TINY), (s + s_step).at_least(TINY));
+        let (k, s) = (k.at_least(TINY), s.at_least(TINY));
+
+        let is_small = s.up_to(k * k) & s_foot.up_to(k_foot * k_foot);
+        let inverse = k.one() / R::select(is_small, k, s);
+        let inverse_foot = k.one() / R::select(is_small, k_foot, s_foot);
+        // (i_f - i) / (i i_f): -(k_f - k), or k_f s - k s_f.
+        let i_change = R::select(is_small, -k_step, k_step.times_plus(s, -(k * s_step)));
+        let i_step = i_change * inverse * inverse_foot;
+        let i = R::select(is_small, inverse, k * inverse);
+        let i_foot = R::select(is_small, inverse_foot, k_foot * inverse_foot);
+        let t = R::select(is_small, s * inverse * inverse, k * i);
+        let t_step = R::select(
+            is_small,
+            (s_step * i_foot).times_plus(i_foot, s * i_step * (i + i_foot)),
+            k_step.times_plus(i_foot, k * i_step),
+        );
+        let (excess, slope) = excess_and_slope(t, t + t_step);
+        let core = excess.times_plus(i, i);
+        let core_step = i_step.times_plus(excess, i_step) + i_foot * t_step * slope;
+        let (c_length, foot_length) = (s.root(), s_foot.root());
+        let right = k.splat(FRAC_PI_2) / c_length;
+        let right_step = -right * s_step / (foot_length * (c_length + foot_length));
+        let limit = k.splat(GREATEST_ARGUMENT);
+        // Seen under more than 90 degrees, an edge may pass closer than its ends.
+        let edge_squared = edge.dot(edge).at_least(TINY);
+        let passes_far = (reach * edge_squared).below(s) & (reach * c_foot_edge).below(s_foot);
+        Half {
+            weight: R::select(is_small, core, right - core),
+            step: R::select(is_small, core_step, right_step - core_step),
+            inverse,
+            excess: excess * i,
+            sine: (self.altitude.dot(self.altitude) / edge_squared).root(),
+            is_small,
+            is_good: t.up_to(limit) & (t + t_step).up_to(limit) & (is_small | passes_far),
+        }
+    }
+}
+
+/// Half the angle under which an edge is seen, and that angle over `|c|`.
+struct HalfAngle<R> {
+    angle: R,
+    weight: R,
+}
+
+impl<R: Real> HalfAngle<R> {
+    /// `atan(|c| / k)` with `c = p x q`, `s = |c|^2` and `k = |p| |q| + p . q`; `reach` is `|p| |q|`, `d` is `p . q`.
+    #[inline(always)]
+    fn new(s: R, reach: R, d: R) -> Self {
+        let k = half_angle_k(s, reach, d);
+        let is_small = s.up_to(k * k);
+        let length = s.root();
+        let inverse = s.one() / k.at_least(TINY);
+        let inverse_length = s.one() / length.at_least(TINY);
+        let ratio = R::select(is_small, length * inverse, k * inverse_length);
+        let excess = arctangent_excess(ratio * ratio);
+        let first = ratio.times_plus(excess, ratio);
+        let large = s.splat(FRAC_PI_2) - first;
+        Self {
+            angle: R::select(is_small, first, large),
+            weight: R::select(is_small, excess.times_plus(inverse, inverse), large * inverse_length),
+        }
+    }
+}
+
+/// `k = |p| |q| + p . q`; beyond a right angle that cancels, but `k (|p| |q| - p . q) = |p x q|^2` does not.
+#[inline(always)]
+fn half_angle_k<R: Real>(s: R, reach: R, d: R) -> R {
+    R::select(d.below(d.zero()), s / (reach - d), reach + d)
+}
+
+/// `-pi F` as Lambert's sum over the edges, `sum W_i n . c_i`.
 ///
-/// Let A be the corner that is alone on its side of the horizon, and B, C the others. AB and AC cross the horizon at
-/// `A + t_b AB` and `A + t_c AC`, `t_b = z_a / (z_a - z_b)`. Above it remain
-/// ```text
-/// all above      B, C, A, A                 edges BC,              CA,  0,          AB
-/// A above        A + t_b AB, A + t_c AC, A, A     h,           t_c CA,  0,      t_b AB
-/// A below        B, C, A + t_c AC, A + t_b AB    BC,     (1 - t_c) CA, -h, (1 - t_b) AB
-/// ```
-/// where `h = t_c AC - t_b AB = t_c BC + (t_c - t_b) AB` runs along the horizon; the second form cancels nothing, as
-/// `t_c - t_b = t_b (z_c - z_b) / (z_a - z_c)`; where rounding puts a cut beyond its edge, that quotient means nothing and
-/// the plain difference serves.
+/// An edge along the horizon, as `is_horizon` marks them, adds `-|n|` times half its angle: `c` is parallel to `n`, which
+/// its rounded numbers do not know. A point just above the light sees that edge pass it closely.
 #[inline(always)]
-pub fn clip_at_horizon<const FUSED: bool>(
-    light: &LightGeometry,
-    [r0, r1, r2]: [Vec3; 3],
-    heights: &Heights,
-) -> Polygon {
-    let [e1, e2] = light.edges();
-    let e12 = light.base;
-    let above = heights.corners.map(|z| z > 0.0);
-    let all = above[0] & above[1] & above[2];
-    // The shortest edge is the first or the second: as AB, it keeps the two long ones next to one another.
-    let second_is_shorter = light.after < light.before;
-    let a_is_1 = !all & (above[1] != above[0]) & (above[1] != above[2]);
-    let a_is_2 = (all & second_is_shorter) | (!all & (above[2] != above[0]) & (above[2] != above[1]));
-    let pick = |at_0: Vec3, at_1: Vec3, at_2: Vec3| {
-        let other = select3(a_is_1, at_1, at_0);
-        select3(a_is_2, at_2, other)
-    };
-    let pick_scalar = |[z0, z1, z2]: [f32; 3]| select(a_is_2, z2, select(a_is_1, z1, z0));
-    let [rise_01, rise_12, rise_20] = heights.rises;
-    let (ab, bc, ca) = (pick(e1, e12, -e2), pick(e12, -e2, e1), pick(-e2, e1, e12));
-    let (a, b, c) = (pick(r0, r1, r2), pick(r1, r2, r0), pick(r2, r0, r1));
-    let z_a = pick_scalar(heights.corners);
-    let (rise_ab, rise_bc, rise_ca) = (
-        pick_scalar([rise_01, rise_12, rise_20]),
-        pick_scalar([rise_12, rise_20, rise_01]),
-        pick_scalar([rise_20, rise_01, rise_12]),
-    );
-
-    let a_above = z_a > 0.0;
-    let t_b = select(all, 1.0, share_of(-z_a, rise_ab));
-    let t_c = select(all, 1.0, share_of(z_a, rise_ca));
-    // 1 - t, from the other end's height.
-    let from_b = select(t_b > 0.0, share_of(z_a + rise_ab, rise_ab), 1.0);
-    let from_c = select(t_c > 0.0, share_of(rise_ca - z_a, rise_ca), 1.0);
-    let cuts_inside = (t_b < 1.0) & (t_c < 1.0) & (t_b > 0.0) & (t_c > 0.0);
-    let h = along::<FUSED>(bc * t_c, select(cuts_inside, t_b * (rise_bc / rise_ca), t_c - t_b), ab);
-    let (cut_b, cut_c) = (along::<FUSED>(a, t_b, ab), along::<FUSED>(a, -t_c, ca));
-    let is_quad = !a_above;
-    let (share_b, share_c) = (select(is_quad, from_b, t_b), select(is_quad, from_c, t_c));
-    Polygon {
-        corners: [
-            select3(is_quad | all, b, cut_b),
-            select3(is_quad | all, c, cut_c),
-            select3(is_quad, cut_c, a),
-            select3(is_quad, cut_b, a),
-        ],
-        edges: [select3(is_quad | all, bc, h), ca * share_c, select3(is_quad, -h, Vec3::ZERO), ab * share_b],
-        share: select(is_quad, mul_add::<FUSED>(1.0 - share_b, share_c, share_b), share_b * share_c),
-        is_quad,
+fn plain_sum<R: Real, const N: usize>(
+    corners: [Vector<R>; N],
+    edges: [Vector<R>; N],
+    is_horizon: [R::Mask; N],
+    n: Vector<R>,
+) -> R {
+    let mut lengths = [n.x; N];
+    for i in 0..N {
+        lengths[i] = corners[i].dot(corners[i]).root();
     }
-}
-
-/// Half of `w = Theta / |c|` of one edge, and what its differences are made of.
-#[derive(Clone, Copy, Debug)]
-struct EdgeWeight {
-    /// `1/k`, with `k = |p| |q| + p . q = |p| |q| (1 + cos Theta)`.
-    inverse: f32,
-    /// `w/2 - 1/k`, accurate where `is_far`.
-    excess: f32,
-    /// `w/2`.
-    half: f32,
-    /// Seen under at most 90 degrees.
-    is_far: bool,
-}
-
-/// `Theta = 2 atan(|c| / k)`, `c = p x q`: one arctangent up to 1 serves every angle,
-/// `w/2 = (1 + t Q(t)) / k` with `t = |c|^2 / k^2` up to 90 degrees, and `(pi/2 - atan(k / |c|)) / |c|` above.
-#[inline(always)]
-fn edge_weight<const FUSED: bool>(c: Vec3, k: f32) -> EdgeWeight {
-    let s = dot::<FUSED>(c, c);
-    let is_far = s <= k * k;
-    let inverse = 1.0 / k.max(TINY);
-    let inverse_length = 1.0 / s.sqrt().max(TINY);
-    let ratio = select(is_far, s.sqrt() * inverse, k * inverse_length);
-    let excess = arctangent_excess::<FUSED>(ratio * ratio);
-    let excess_far = excess * inverse;
-    let half_near = (FRAC_PI_2 - mul_add::<FUSED>(ratio, excess, ratio)) * inverse_length;
-    EdgeWeight { inverse, excess: excess_far, half: select(is_far, inverse + excess_far, half_near), is_far }
-}
-
-/// `-pi F` of a polygon that lies above the horizon; `n_normal` is `n . N` of the whole triangle.
-///
-/// As in [`super::far::far_triangle`], with `W_i = w_i / 2` and `P_i = n . (c_0 + .. + c_i)`, of which `P_3` is known,
-/// ```text
-/// sum_i W_i n.c_i = W_3 P_3 + (W_0 - W_1) P_0 + (W_1 - W_2) P_1 + (W_2 - W_3) P_2
-/// ```
-/// and differences of `1/k` come from those of `k`: for edges pq and qs, with `D = s - p`,
-/// `k_qs - k_pq = |q| (|s| - |p|) + q.D`, `|s| - |p| = D.(s + p) / (|s| + |p|)`.
-/// A triangle goes straight from `W_1` to `W_3`. Where an edge is seen under more than 90 degrees nothing cancels, and
-/// the plain sum is the better one: the point may be so close that the `P_i` are far larger than the `n.c_i`.
-#[inline(always)]
-pub fn polygon_sum<const FUSED: bool>(polygon: &Polygon, n: Vec3, n_normal: f32) -> f32 {
-    let Polygon { corners: q, edges: e, share, is_quad } = *polygon;
-    let length = q.map(|q| dot::<FUSED>(q, q).sqrt());
-    let mut flux = [0.0; 4];
-    let mut weight = [EdgeWeight { inverse: 0.0, excess: 0.0, half: 0.0, is_far: true }; 4];
-    for i in 0..4 {
-        let next = (i + 1) % 4;
-        let k = mul_add::<FUSED>(length[i], length[next], dot::<FUSED>(q[i], q[next]));
-        let c = cross::<FUSED>(q[i], e[i]);
-        flux[i] = dot::<FUSED>(n, c);
-        weight[i] = edge_weight::<FUSED>(c, k);
+    let normal_length = n.dot(n).root();
+    let mut sum = n.x.zero();
+    for i in 0..N {
+        let (p, q) = (corners[i], corners[(i + 1) % N]);
+        // From the nearer end: from the other it would be rounded to that one's distance.
+        let c = Vector::select(lengths[i].below(lengths[(i + 1) % N]), p, q).cross(edges[i]);
+        let half = HalfAngle::new(c.dot(c), lengths[i] * lengths[(i + 1) % N], p.dot(q));
+        let term = R::select(is_horizon[i], -(half.angle * normal_length), half.weight * n.dot(c));
+        sum = sum + term;
     }
-    let step = |from: usize, to_weight: EdgeWeight, mid: usize, p: usize, s: Vec3, s_length: f32, d: Vec3| {
-        let stretch = dot::<FUSED>(d, s + q[p]) / (s_length + length[p]).max(TINY);
-        let k_step = mul_add::<FUSED>(length[mid], stretch, dot::<FUSED>(q[mid], d));
-        let inverse_step = k_step * weight[from].inverse * to_weight.inverse;
-        inverse_step + (weight[from].excess - to_weight.excess)
-    };
-    let step_01 = step(0, weight[1], 1, 0, q[2], length[2], -(e[2] + e[3]));
-    let after_1 = EdgeWeight {
-        inverse: select(is_quad, weight[2].inverse, weight[3].inverse),
-        excess: select(is_quad, weight[2].excess, weight[3].excess),
-        ..weight[2]
-    };
-    let (s, s_length) = (select3(is_quad, q[3], q[0]), select(is_quad, length[3], length[0]));
-    let step_1 = step(1, after_1, 2, 1, s, s_length, select3(is_quad, e[1] + e[2], -e[0]));
-    let step_23 = select(is_quad, step(2, weight[3], 3, 2, q[0], length[0], e[2] + e[3]), 0.0);
-
-    let total = n_normal * share;
-    let mut sum = weight[3].half * total;
-    sum = mul_add::<FUSED>(step_01, flux[0], sum);
-    sum = mul_add::<FUSED>(step_1, flux[0] + flux[1], sum);
-    sum = mul_add::<FUSED>(step_23, total - flux[3], sum);
-    let mut plain = weight[0].half * flux[0];
-    for i in 1..4 {
-        plain = mul_add::<FUSED>(weight[i].half, flux[i], plain);
-    }
-    let nearest = length[0].min(length[1]).min(length[2]).min(length[3]);
-    let all_far = (nearest > NEAREST_BY_DIFFERENCES)
-        & weight[0].is_far
-        & weight[1].is_far
-        & weight[2].is_far
-        & weight[3].is_far;
-    select(all_far, sum, plain)
-}
-
-/// `part / whole`, kept within 0 to 1; 0 for 0 / 0, an edge within the horizon.
-#[inline(always)]
-fn share_of(part: f32, whole: f32) -> f32 {
-    let t = part / whole;
-    select(t > 0.0, select(t < 1.0, t, 1.0), 0.0)
-}
-
-#[inline(always)]
-fn select(condition: bool, yes: f32, no: f32) -> f32 {
-    if condition { yes } else { no }
-}
-
-#[inline(always)]
-fn select3(condition: bool, yes: Vec3, no: Vec3) -> Vec3 {
-    Vec3::new(select(condition, yes.x, no.x), select(condition, yes.y, no.y), select(condition, yes.z, no.z))
+    sum
 }
