@@ -8,4 +8,5 @@ pub mod scenes;
 pub mod metrics;
 pub mod form_factor;
 pub mod thesis;
+pub mod plot;
 pub mod pareto;
