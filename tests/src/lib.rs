@@ -5,6 +5,7 @@ pub mod glb;
 pub mod cornell;
 pub mod sample_asset;
 pub mod scenes;
+pub mod flip;
 pub mod metrics;
 pub mod form_factor;
 pub mod thesis;
