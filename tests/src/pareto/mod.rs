@@ -7,5 +7,11 @@ pub mod curves;
 pub mod numbers;
 pub mod equal;
 pub mod summary;
+pub mod figures;
+pub mod false_colour;
+pub mod sheet;
+pub mod report;
 #[cfg(test)]
 mod made_up;
+
+pub use report::{ReportError, report};

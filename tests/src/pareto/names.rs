@@ -17,6 +17,12 @@ pub fn picture_file(method: &str, knob: &str) -> String {
     file_name(format!("{method} {knob}").trim()) + ".exr"
 }
 
+/// The contact sheet of a scene and camera.
+#[must_use]
+pub fn sheet_file(scene: &str, camera: &str) -> String {
+    format!("{}_{}_sheet.png", file_name(scene), file_name(camera))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

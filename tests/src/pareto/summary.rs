@@ -5,17 +5,18 @@ use std::fmt::Write;
 
 use super::curves::{SceneCurves, Spread, YARDSTICK, distinct, method_name, method_order, scene_curves};
 use super::equal::{Equal, table};
-use super::names::file_name;
+use super::names::{file_name, sheet_file};
 use super::numbers::{range, short, time};
 use super::row::Row;
 
-/// The summary of a run's rows, in Markdown. The same rows give the same text.
+/// The summary of a run's rows, in Markdown; `sheets` says that contact sheets lie beside it. The same rows give the same
+/// text.
 #[must_use]
-pub fn summary(rows: &[Row]) -> String {
+pub fn summary(rows: &[Row], sheets: bool) -> String {
     let mut text = introduction(rows);
     for scene in scene_curves(rows) {
         let rows: Vec<&Row> = rows.iter().filter(|row| row.scene == scene.scene).collect();
-        text += &scene_section(&scene, &rows);
+        text += &scene_section(&scene, &rows, sheets);
     }
     text
 }
@@ -38,7 +39,7 @@ fn introduction(rows: &[Row]) -> String {
     )
 }
 
-fn scene_section(scene: &SceneCurves, rows: &[&Row]) -> String {
+fn scene_section(scene: &SceneCurves, rows: &[&Row], sheets: bool) -> String {
     let name = &scene.scene;
     let file = file_name(name);
     let mut text = format!(
@@ -53,13 +54,13 @@ fn scene_section(scene: &SceneCurves, rows: &[&Row]) -> String {
     }
     for camera in &scene.cameras {
         let rows: Vec<&Row> = rows.iter().filter(|row| row.camera == *camera).copied().collect();
-        text += &camera_section(scene, camera, &rows);
+        text += &camera_section(scene, camera, &rows, sheets);
     }
     text
 }
 
 /// Every setting of every method as one camera sees it.
-fn camera_section(scene: &SceneCurves, camera: &str, rows: &[&Row]) -> String {
+fn camera_section(scene: &SceneCurves, camera: &str, rows: &[&Row], sheets: bool) -> String {
     let size =
         rows.first().map_or_else(String::new, |row| format!("{} x {} pixels. ", row.width, row.height));
     let spp = distinct(
@@ -67,8 +68,13 @@ fn camera_section(scene: &SceneCurves, camera: &str, rows: &[&Row]) -> String {
     );
     let noise = Spread::of(rows.iter().map(|row| row.truth_noise)).unwrap_or_default();
     let noise = if noise.low == noise.high { short(noise.low) } else { range(&noise, short) };
+    let sheet = if sheets {
+        format!("![{} from {camera}: every method]({})\n\n", scene.scene, sheet_file(&scene.scene, camera))
+    } else {
+        String::new()
+    };
     let mut text = format!(
-        "\n### {} from {camera}\n\n{size}Truth: {} directions per pixel, noise {noise} (relative RMSE).\n\n\
+        "\n### {} from {camera}\n\n{sheet}{size}Truth: {} directions per pixel, noise {noise} (relative RMSE).\n\n\
          | method | setting | front | lights | pairs | rays | bytes | prepare | inject | gather | frame \
          | least .. greatest | relative RMSE | least .. greatest | algorithm | relMSE | FLIP | energy | p99 | jump \
          | frame change |\n|---|---|---|{}\n",
@@ -143,7 +149,7 @@ mod tests {
 
     #[test]
     fn settings_have_medians_their_spread_and_a_place_on_the_front() {
-        let text = summary(&rows());
+        let text = summary(&rows(), false);
         let best = line(&text, "| vlm | lights=464 | * |");
         assert!(
             best.contains(
@@ -157,7 +163,7 @@ mod tests {
 
     #[test]
     fn columns_match_their_header() {
-        let text = summary(&rows());
+        let text = summary(&rows(), false);
         for table in text.split("\n\n").filter(|part| part.starts_with('|')) {
             let columns: Vec<usize> = table.lines().map(|line| line.matches('|').count()).collect();
             assert!(columns.windows(2).all(|pair| pair[0] == pair[1]), "{table}");
@@ -168,22 +174,22 @@ mod tests {
     fn the_order_of_the_rows_within_a_scene_does_not_matter() {
         let mut other = rows();
         other.reverse();
-        assert_eq!(summary(&rows()), summary(&other));
+        assert_eq!(summary(&rows(), false), summary(&other, false));
     }
 
     #[test]
     fn doubtful_rows_are_marked_where_they_stand() {
         let mut rows = rows();
-        let marks = |rows: &[Row]| summary(rows).matches('†').count();
+        let marks = |rows: &[Row]| summary(rows, false).matches('†').count();
         assert_eq!(marks(&rows), 1, "the explanation");
         rows[1].truth_suffices = false;
-        assert!(line(&summary(&rows), "| vlm | lights=116 |").contains("0.300 †"));
-        assert!(!line(&summary(&rows), "| vlm | lights=464 |").contains('†'));
+        assert!(line(&summary(&rows, false), "| vlm | lights=116 |").contains("0.300 †"));
+        assert!(!line(&summary(&rows, false), "| vlm | lights=464 |").contains('†'));
     }
 
     #[test]
     fn equal_time_and_equal_error_are_compared() {
-        let text = summary(&rows());
+        let text = summary(&rows(), false);
         assert!(text.contains("### box at equal time") && text.contains("### box at equal error"));
         assert!(text.contains("| thesis | not reached | – |"), "{text}");
         assert!(
