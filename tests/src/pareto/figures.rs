@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::curves::{MethodCurve, SceneCurves, Setting, Spread};
 use super::names::file_name;
+use super::numbers::short;
 use super::row::Row;
 use crate::plot::{Axis, Curve, Figure, Line, Marker, PlotError, Point};
 
@@ -43,73 +44,110 @@ fn point(setting: &Setting, error: &Spread) -> Point {
 
 /// All settings, pale, and each method's front in front of them.
 fn pareto(scene: &SceneCurves, conditions: &str) -> Figure {
-    let all = |method: &MethodCurve| Curve {
-        line: Line::Hidden,
-        faint: true,
-        ..Curve::new(
-            "",
-            method.series,
-            method.settings.iter().map(|s| Point::new(s.seconds.median, s.error.median)).collect(),
-        )
-    };
-    let front = |method: &MethodCurve| {
+    let (timed, untimed): (Vec<_>, Vec<_>) = scene.methods.iter().partition(|method| takes_time(method));
+    let mut curves: Vec<Curve> = timed.iter().map(|method| all_settings(method)).collect();
+    for method in &timed {
         let points = method.front().into_iter().map(|setting| point(setting, &setting.error)).collect();
-        Curve::new(&method.name, method.series, points)
-    };
-    let methods = &scene.methods;
+        curves.push(Curve::new(&method.name, method.series, points));
+    }
+    curves.extend(untimed.iter().filter_map(|method| level(&method.name, method, time_range(scene)?)));
+    let doubtful: Vec<Curve> = timed.iter().filter_map(|method| doubtful_settings(method)).collect();
+    let hollow = if doubtful.is_empty() { "" } else { "; hollow: the truth is too noisy to tell" };
+    curves.extend(doubtful);
     Figure {
         title: format!("{}: error against time", scene.scene),
         subtitle: format!(
-            "{conditions}. Lines: Pareto fronts; pale: all other settings; bars: least to greatest"
+            "{conditions}. Lines: Pareto fronts; pale: all other settings; bars: least to greatest{hollow}"
         ),
-        x: Axis::log("time of a frame (s)"),
+        x: Axis::log(TIME),
         y: Axis::log("relative RMSE against the path-traced truth"),
-        curves: methods.iter().map(all).chain(methods.iter().map(front)).collect(),
-    }
-}
-
-/// The front's settings: error against the truth, and error against the exact sum over the same lights.
-fn split(scene: &SceneCurves, conditions: &str) -> Figure {
-    let mut curves = Vec::new();
-    for method in &scene.methods {
-        let front = method.front();
-        let model = front.iter().map(|setting| point(setting, &setting.error)).collect();
-        curves.push(Curve::new(&format!("{}: model", method.name), method.series, model));
-        let algorithm = |setting: &&Setting| setting.algorithm.map(|error| point(setting, &error));
-        let algorithm: Vec<Point> = front.iter().filter_map(algorithm).collect();
-        if !algorithm.is_empty() {
-            curves.push(Curve {
-                line: Line::Dashed,
-                marker: Marker::Hollow,
-                ..Curve::new(&format!("{}: algorithm", method.name), method.series, algorithm)
-            });
-        }
-    }
-    let y = Axis::log("relative RMSE");
-    Figure {
-        title: format!("{}: error of the algorithm and of the model", scene.scene),
-        subtitle: format!(
-            "{conditions}. Model: against the truth; algorithm: against the exact sum of the same lights"
-        ),
-        x: Axis::log("time of a frame (s)"),
-        y: Axis { range: split_range(scene), ..y },
         curves,
     }
 }
 
-fn split_range(scene: &SceneCurves) -> Option<(f64, f64)> {
-    let settings = || scene.methods.iter().flat_map(MethodCurve::front);
-    let positive = |values: &mut dyn Iterator<Item = f64>| -> Option<(f64, f64)> {
-        values.filter(|value| *value > 0.0).fold(None, |range: Option<(f64, f64)>, value| {
-            let (low, high) = range.unwrap_or((value, value));
-            Some((low.min(value), high.max(value)))
-        })
+const TIME: &str = "time of a frame (s)";
+
+/// True if any setting has a place on a logarithmic axis of time.
+fn takes_time(method: &MethodCurve) -> bool {
+    method.settings.iter().any(|setting| setting.seconds.median > 0.0)
+}
+
+fn all_settings(method: &MethodCurve) -> Curve {
+    let points = method.settings.iter().map(|s| Point::new(s.seconds.median, s.error.median)).collect();
+    Curve { line: Line::Hidden, faint: true, ..Curve::new("", method.series, points) }
+}
+
+/// The settings on the front that the truth does not suffice for.
+fn doubtful_settings(method: &MethodCurve) -> Option<Curve> {
+    let doubtful = method.front().into_iter().filter(|setting| !setting.suffices);
+    let points: Vec<Point> = doubtful.map(|s| Point::new(s.seconds.median, s.error.median)).collect();
+    let curve = Curve { line: Line::Hidden, marker: Marker::Hollow, ..Curve::new("", method.series, points) };
+    (!curve.points.is_empty()).then_some(curve)
+}
+
+/// The least error of a method that takes no time, across the figure: such as no indirect light at all.
+fn level(name: &str, method: &MethodCurve, (low, high): (f64, f64)) -> Option<Curve> {
+    let error = method.settings.iter().map(|setting| setting.error.median).min_by(f64::total_cmp)?;
+    let points = vec![Point::new(low, error), Point::new(high, error)];
+    let name = format!("{name} (no time)");
+    Some(Curve { line: Line::Dashed, marker: Marker::Hidden, ..Curve::new(&name, method.series, points) })
+}
+
+/// From the fastest to the slowest setting.
+fn time_range(scene: &SceneCurves) -> Option<(f64, f64)> {
+    let settings = scene.methods.iter().flat_map(|method| &method.settings);
+    positive_range(settings.flat_map(|setting| [setting.seconds.low, setting.seconds.high]))
+}
+
+fn positive_range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    values.filter(|value| *value > 0.0).fold(None, |range: Option<(f64, f64)>, value| {
+        let (low, high) = range.unwrap_or((value, value));
+        Some((low.min(value), high.max(value)))
+    })
+}
+
+/// The front's settings: error against the truth, and error against the exact sum over the same lights.
+fn split(scene: &SceneCurves, conditions: &str) -> Figure {
+    let floor = split_floor(scene);
+    let mut curves = Vec::new();
+    for method in &scene.methods {
+        let front = method.front();
+        let model = format!("{}: model", method.name);
+        if takes_time(method) {
+            let points = front.iter().map(|setting| point(setting, &setting.error)).collect();
+            curves.push(Curve::new(&model, method.series, points));
+        } else {
+            curves.extend(time_range(scene).and_then(|range| level(&model, method, range)));
+        }
+        curves.extend(algorithm(method, &front, floor));
+    }
+    Figure {
+        title: format!("{}: error of the algorithm and of the model", scene.scene),
+        subtitle: format!(
+            "{conditions}. Model: against the truth; algorithm: against the exact sum over the same lights"
+        ),
+        x: Axis::log(TIME),
+        y: Axis::log("relative RMSE"),
+        curves,
+    }
+}
+
+/// What errs by less than the figure shows, says so in the legend.
+fn algorithm(method: &MethodCurve, front: &[&Setting], floor: f64) -> Option<Curve> {
+    let points = front.iter().filter_map(|setting| Some(point(setting, &setting.algorithm?)));
+    let (below, shown): (Vec<Point>, Vec<Point>) = points.partition(|point| point.y < floor);
+    let name = match (below.len(), shown.len()) {
+        (0, 0) => return None,
+        (0, _) => format!("{}: algorithm", method.name),
+        (_, 0) => format!("{}: algorithm < {}", method.name, short(floor)),
+        _ => format!("{}: algorithm, or < {}", method.name, short(floor)),
     };
-    let (least_model, most_model) = positive(&mut settings().flat_map(|s| [s.error.low, s.error.high]))?;
-    let algorithm = settings().filter_map(|s| s.algorithm).flat_map(|error| [error.low, error.high]);
-    let (least, most) = positive(&mut algorithm.into_iter()).unwrap_or((least_model, most_model));
-    let low = least.min(least_model).max(SPLIT_DEPTH * least_model);
-    Some((0.8 * low, 1.25 * most.max(most_model)))
+    Some(Curve { line: Line::Dashed, marker: Marker::Hollow, ..Curve::new(&name, method.series, shown) })
+}
+
+fn split_floor(scene: &SceneCurves) -> f64 {
+    let settings = scene.methods.iter().flat_map(MethodCurve::front);
+    positive_range(settings.map(|setting| setting.error.median)).map_or(0.0, |(least, _)| SPLIT_DEPTH * least)
 }
 
 #[cfg(test)]
@@ -142,12 +180,31 @@ mod tests {
     }
 
     #[test]
+    fn what_takes_no_time_is_a_level() {
+        let rows = [row("s", "c", "direct", "", 0, 0.0, 1.0), row("s", "c", "vlm", "", 0, 0.5, 0.1)];
+        let figure = pareto(&scene_curves(&rows)[0], "");
+        let direct = figure.curves.iter().find(|curve| curve.name == "direct (no time)").unwrap();
+        assert_eq!(direct.points, [Point::new(0.5, 1.0); 2]);
+    }
+
+    #[test]
+    fn doubtful_settings_are_hollow() {
+        let mut rows = [row("s", "c", "brute", "", 0, 0.1, 0.2), row("s", "c", "vlm", "", 0, 0.5, 0.1)];
+        let hollow = |rows: &[Row]| -> Vec<usize> {
+            let curves = pareto(&scene_curves(rows)[0], "").curves;
+            curves.iter().filter(|curve| curve.marker == Marker::Hollow).map(|curve| curve.series).collect()
+        };
+        assert_eq!(hollow(&rows), [0; 0]);
+        rows[1].truth_suffices = false;
+        assert_eq!(hollow(&rows), [1]);
+    }
+
+    #[test]
     fn the_split_shows_the_algorithm_where_there_is_one() {
         let figure = split(&scene(), "");
         let names: Vec<&str> = figure.curves.iter().map(|curve| curve.name.as_str()).collect();
-        assert_eq!(names, ["direct: model", "vlm: model", "vlm: algorithm"]);
-        let (low, high) = figure.y.range.unwrap();
-        assert!(low > 1e-3 && low < 0.05 && high > 1.0, "rounding lies below the figure: {low} {high}");
+        assert_eq!(names, ["direct: model", "vlm: model", "vlm: algorithm, or < 0.00200"]);
+        assert_eq!(figure.curves[2].points, [Point::new(0.01, 0.05)], "rounding lies below the figure");
     }
 
     #[test]

@@ -9,7 +9,7 @@ use vlm_shaders::cpu::resolve::{auto_exposure, encode_srgb, luminance, tone_map}
 
 use super::false_colour::false_colour;
 use super::numbers::{levels, short};
-use crate::plot::canvas::{Anchor, BITMAP_SCALE, Canvas, Lettering, Reason, Stroke, bitmap, text_width};
+use crate::plot::canvas::{Anchor, BITMAP_SCALE, Canvas, Lettering, Reason, Stroke, bitmap, wrap};
 use crate::plot::{PlotError, write_png};
 
 /// One method's picture.
@@ -42,7 +42,7 @@ pub struct Sheet {
 const TILE: f64 = 236.0;
 /// Between pictures, and round everything.
 const GAP: f64 = 16.0;
-/// Pictures beside each other.
+/// Pictures beside each other, at most.
 const COLUMNS: usize = 4;
 /// The sheet's title.
 const TITLE: f64 = 44.0;
@@ -132,7 +132,8 @@ impl Sheet {
 
     fn layout(&self) -> Result<Layout, Reason> {
         let entries = 1 + self.methods.len();
-        let columns = entries.min(COLUMNS);
+        // As few rows as it takes, of about equal length.
+        let columns = entries.div_ceil(entries.div_ceil(COLUMNS));
         let tile_height = (TILE * f64::from(self.height) / f64::from(self.width.max(1))).round();
         let mut lines = 0;
         for entry in std::iter::once(&self.truth).chain(&self.methods) {
@@ -193,22 +194,9 @@ fn lettering() -> Lettering {
     Lettering { em: EM, colour: INK, bold: false, anchor: Anchor::Start, upwards: false }
 }
 
-/// Breaks notes at spaces, so that each line fits above its picture.
+/// The notes in lines that fit above a picture.
 fn wrapped(notes: &[String]) -> Result<Vec<String>, Reason> {
-    let mut lines = Vec::new();
-    for note in notes {
-        let mut line = String::new();
-        for word in note.split_whitespace() {
-            let longer = if line.is_empty() { word.to_owned() } else { format!("{line} {word}") };
-            if line.is_empty() || text_width(&longer, EM, false)? <= TILE {
-                line = longer;
-            } else {
-                lines.push(std::mem::replace(&mut line, word.to_owned()));
-            }
-        }
-        lines.push(line);
-    }
-    Ok(lines)
+    wrap(&notes.join("\n"), EM, TILE)
 }
 
 fn shown(exposed: Vec3) -> [u8; 3] {
@@ -296,22 +284,11 @@ mod tests {
     }
 
     #[test]
-    fn long_notes_are_broken_and_short_ones_not() {
-        let fits =
-            |notes: &[&str]| wrapped(&notes.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>()).unwrap();
-        assert_eq!(fits(&["n=1", "x"]), ["n=1", "x"]);
-        let lines = fits(&["lights=464 range=4.5 list=128 grid=32 preset=quality"]);
-        assert!(
-            lines.len() == 2 && lines.iter().all(|line| text_width(line, EM, false).unwrap() <= TILE),
-            "{lines:?}"
-        );
-    }
-
-    #[test]
-    fn sheets_wrap_after_four_pictures() {
+    fn sheets_have_rows_of_about_equal_length() {
         assert_eq!(sheet(&[1.0; 2]).layout().unwrap().columns, 3);
-        let two_rows = sheet(&[1.0; 5]).layout().unwrap();
-        assert_eq!(two_rows.corner(4).0, two_rows.corner(0).0);
-        assert!(two_rows.corner(4).1 > two_rows.corner(0).1);
+        assert_eq!(sheet(&[1.0; 3]).layout().unwrap().columns, 4);
+        let two_rows = sheet(&[1.0; 4]).layout().unwrap();
+        assert_eq!((two_rows.columns, two_rows.corner(3).0), (3, two_rows.corner(0).0));
+        assert!(two_rows.corner(3).1 > two_rows.corner(0).1);
     }
 }

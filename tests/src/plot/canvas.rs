@@ -144,6 +144,28 @@ pub fn text_width(text: &str, em: f64, bold: bool) -> Result<f64, Reason> {
     Ok(f64::from(width) / enlarged)
 }
 
+/// Breaks text at its line breaks, and at spaces where a line would be wider than `width`. A word that is too wide alone
+/// stays whole.
+///
+/// # Errors
+/// The drawing library's reason.
+pub fn wrap(text: &str, em: f64, width: f64) -> Result<Vec<String>, Reason> {
+    let mut lines = Vec::new();
+    for paragraph in text.lines() {
+        let mut line = String::new();
+        for word in paragraph.split_whitespace() {
+            let longer = if line.is_empty() { word.to_owned() } else { format!("{line} {word}") };
+            if line.is_empty() || text_width(&longer, em, false)? <= width {
+                line = longer;
+            } else {
+                lines.push(std::mem::replace(&mut line, word.to_owned()));
+            }
+        }
+        lines.push(line);
+    }
+    Ok(lines)
+}
+
 fn units((x, y): (f64, f64)) -> (i32, i32) {
     ((x * UNITS).round() as i32, (y * UNITS).round() as i32)
 }
@@ -218,5 +240,27 @@ impl<DB: DrawingBackend> Canvas<DB> {
         let colour = rgb(colour);
         let style = TextStyle::from(font).color(&colour).pos(Pos::new(horizontal, VPos::Top));
         self.area.draw(&Text::new(text, units(corner), style)).map_err(|e| e.to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_breaks_where_it_must() {
+        assert_eq!(wrap("n=1\nx y", 12.0, 200.0).unwrap(), ["n=1", "x y"]);
+        let lines = wrap("lights=464 range=4.5 list=128 grid=32 preset=quality", 12.0, 236.0).unwrap();
+        assert_eq!(lines.len(), 2);
+        assert!(lines.iter().all(|line| text_width(line, 12.0, false).unwrap() <= 236.0), "{lines:?}");
+        assert_eq!(wrap("unbreakable word", 12.0, 10.0).unwrap(), ["unbreakable", "word"]);
+        assert_eq!(wrap("", 12.0, 10.0).unwrap(), [""; 0]);
+    }
+
+    #[test]
+    fn wider_letters_take_more_room() {
+        let width = |text, em| text_width(text, em, false).unwrap();
+        assert!(width("MMM", 12.0) > 2.0 * width("iii", 12.0));
+        assert!((width("abc", 24.0) / width("abc", 12.0) - 2.0).abs() < 0.02);
     }
 }

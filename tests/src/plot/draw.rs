@@ -4,7 +4,7 @@ use plotters::prelude::DrawingBackend;
 
 use super::Figure;
 use super::axis::{Axis, Tick};
-use super::canvas::{Anchor, Canvas, Lettering, Reason, Stroke, text_width};
+use super::canvas::{Anchor, Canvas, Lettering, Reason, Stroke, text_width, wrap};
 use super::curves::{Curve, Line, Marker, Point, marker_outline, series_colour};
 
 /// Width and height of every figure, pixels.
@@ -19,6 +19,8 @@ const WHITE: [u8; 3] = [255, 255, 255];
 const EM: f64 = 13.0;
 /// Between the figure's edge and what is in it.
 const EDGE: f64 = 14.0;
+const SUBTITLE_EM: f64 = 12.0;
+const SUBTITLE_LINE: f64 = 16.0;
 /// From one line of the legend to the next.
 const LEGEND_LINE: f64 = 21.0;
 /// Length of the piece of line in the legend.
@@ -79,10 +81,12 @@ fn layout(figure: &Figure) -> Result<Plot<'_>, Reason> {
     let labels = widest(ticks.iter().filter_map(|tick| tick.label.as_deref()))?;
     let names = widest(figure.curves.iter().map(|curve| curve.name.as_str()))?;
     let legend = if names > 0.0 { LEGEND_KEY + 8.0 + names + EDGE } else { 0.0 };
+    let left = EDGE + EM + 12.0 + labels + 8.0;
+    let subtitle = subtitle_lines(figure, left)?.len();
     Ok(Plot {
-        left: EDGE + EM + 12.0 + labels + 8.0,
+        left,
         right: f64::from(SIZE.0) - EDGE - legend - 8.0,
-        top: if figure.subtitle.is_empty() { 44.0 } else { 64.0 },
+        top: 44.0 + if subtitle == 0 { 0.0 } else { 4.0 + SUBTITLE_LINE * subtitle as f64 },
         bottom: f64::from(SIZE.1) - 68.0,
         x: (&figure.x, x_range),
         y: (&figure.y, y_range),
@@ -93,6 +97,11 @@ fn widest<'a>(mut texts: impl Iterator<Item = &'a str>) -> Result<f64, Reason> {
     texts.try_fold(0f64, |widest, text| Ok(widest.max(text_width(text, EM, false)?)))
 }
 
+/// The subtitle, broken at the figure's edge.
+fn subtitle_lines(figure: &Figure, left: f64) -> Result<Vec<String>, Reason> {
+    wrap(&figure.subtitle, SUBTITLE_EM, f64::from(SIZE.0) - EDGE - left)
+}
+
 fn draw_titles<DB: DrawingBackend>(
     canvas: &Canvas<DB>,
     figure: &Figure,
@@ -100,7 +109,10 @@ fn draw_titles<DB: DrawingBackend>(
 ) -> Result<(), Reason> {
     let title = Lettering { bold: true, ..lettering(17.0, INK, Anchor::Start) };
     canvas.text(&figure.title, (plot.left, 28.0), title)?;
-    canvas.text(&figure.subtitle, (plot.left, 49.0), lettering(12.0, GREY, Anchor::Start))?;
+    for (i, line) in subtitle_lines(figure, plot.left)?.iter().enumerate() {
+        let baseline = 49.0 + SUBTITLE_LINE * i as f64;
+        canvas.text(line, (plot.left, baseline), lettering(SUBTITLE_EM, GREY, Anchor::Start))?;
+    }
     let middle = (0.5 * (plot.left + plot.right), 0.5 * (plot.top + plot.bottom));
     let label = lettering(EM + 1.0, INK, Anchor::Middle);
     canvas.text(&figure.x.label, (middle.0, plot.bottom + 43.0), label)?;
@@ -169,17 +181,15 @@ fn colour(curve: &Curve) -> [u8; 3] {
 
 fn draw_curve<DB: DrawingBackend>(canvas: &Canvas<DB>, plot: &Plot<'_>, curve: &Curve) -> Result<(), Reason> {
     let places: Vec<_> = curve.points.iter().map(|point| plot.place(point)).collect();
+    let placed = || curve.points.iter().zip(&places).filter_map(|(point, place)| Some((point, (*place)?)));
+    for (point, place) in placed() {
+        draw_spread(canvas, plot, point, place, pale(series_colour(curve.series)))?;
+    }
     for run in places.split(Option::is_none) {
         let run: Vec<_> = run.iter().flatten().copied().collect();
         draw_line(canvas, curve, &run)?;
     }
-    for (point, place) in curve.points.iter().zip(&places) {
-        if let Some(place) = *place {
-            draw_spread(canvas, plot, point, place, colour(curve))?;
-            draw_marker(canvas, curve, place)?;
-        }
-    }
-    Ok(())
+    placed().try_for_each(|(_, place)| draw_marker(canvas, curve, place))
 }
 
 fn draw_line<DB: DrawingBackend>(
@@ -196,6 +206,7 @@ fn draw_line<DB: DrawingBackend>(
     if run.len() < 2 { Ok(()) } else { canvas.line(run, Stroke { colour: colour(curve), width, dash }) }
 }
 
+/// Bars from the least to the greatest value, with caps.
 fn draw_spread<DB: DrawingBackend>(
     canvas: &Canvas<DB>,
     plot: &Plot<'_>,
@@ -203,15 +214,24 @@ fn draw_spread<DB: DrawingBackend>(
     (x, y): (f64, f64),
     colour: [u8; 3],
 ) -> Result<(), Reason> {
-    let stroke = Stroke { colour, width: 1.25, dash: None };
+    const CAP: f64 = 3.0;
+    let stroke = Stroke { colour, width: 1.5, dash: None };
     let whole = |axis: (&Axis, (f64, f64)), spread: Option<(f64, f64)>| {
         spread.filter(|s| axis.0.shows(s.0, Some(axis.1)) && axis.0.shows(s.1, Some(axis.1)))
     };
     if let Some((low, high)) = whole(plot.x, point.x_spread) {
-        canvas.line(&[(plot.across(low), y), (plot.across(high), y)], stroke)?;
+        let (left, right) = (plot.across(low), plot.across(high));
+        canvas.line(&[(left, y), (right, y)], stroke)?;
+        for end in [left, right] {
+            canvas.line(&[(end, y - CAP), (end, y + CAP)], stroke)?;
+        }
     }
     if let Some((low, high)) = whole(plot.y, point.y_spread) {
-        canvas.line(&[(x, plot.down(low)), (x, plot.down(high))], stroke)?;
+        let (bottom, top) = (plot.down(low), plot.down(high));
+        canvas.line(&[(x, bottom), (x, top)], stroke)?;
+        for end in [bottom, top] {
+            canvas.line(&[(x - CAP, end), (x + CAP, end)], stroke)?;
+        }
     }
     Ok(())
 }

@@ -17,7 +17,7 @@ pub use curves::{Curve, Line, Marker, Point, SERIES, series_colour};
 pub struct Figure {
     /// What it shows.
     pub title: String,
-    /// What a reader must know to read it: device, conditions. May be empty.
+    /// What a reader must know to read it: device, conditions. Broken where it does not fit; may be empty.
     pub subtitle: String,
     /// The horizontal axis.
     pub x: Axis,
