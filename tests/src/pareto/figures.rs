@@ -57,7 +57,7 @@ fn pareto(scene: &SceneCurves, conditions: &str) -> Figure {
     Figure {
         title: format!("{}: error against time", scene.scene),
         subtitle: format!(
-            "{conditions}. Lines: Pareto fronts; pale: all other settings; bars: least to greatest{hollow}"
+            "{conditions}\nLines: Pareto fronts; pale: all other settings; bars: least to greatest{hollow}"
         ),
         x: Axis::log(TIME),
         y: Axis::log("relative RMSE against the path-traced truth"),
@@ -124,7 +124,7 @@ fn split(scene: &SceneCurves, conditions: &str) -> Figure {
     Figure {
         title: format!("{}: error of the algorithm and of the model", scene.scene),
         subtitle: format!(
-            "{conditions}. Model: against the truth; algorithm: against the exact sum over the same lights"
+            "{conditions}\nModel: against the truth; algorithm: against the exact sum over the same lights"
         ),
         x: Axis::log(TIME),
         y: Axis::log("relative RMSE"),

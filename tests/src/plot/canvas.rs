@@ -11,7 +11,7 @@ use plotters::style::{Color, FontStyle, FontTransform, RGBColor, ShapeStyle, Tex
 
 /// The drawing library counts in whole units: so many of them make a pixel.
 const UNITS: f64 = 4.0;
-/// A bitmap has so many pixels per pixel of the screen, and is drawn with [`UNITS`] of them and averaged down.
+/// A bitmap has so many pixels per pixel of the screen, and is averaged down from twice as many.
 pub const BITMAP_SCALE: u32 = 2;
 /// What an SVG asks the viewer for, and the name under which the embedded font is known when a bitmap is drawn.
 const FAMILY: &str = "sans-serif";
