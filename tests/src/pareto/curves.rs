@@ -71,7 +71,7 @@ pub struct SceneCurves {
     pub scene: String,
     /// Its cameras, in the order of the rows.
     pub cameras: Vec<String>,
-    /// The yardstick first, then by name.
+    /// The yardstick, ours, then by name.
     pub methods: Vec<MethodCurve>,
     /// Settings that lack a camera in every repeat, and so have no place in a mean over cameras.
     pub incomplete: Vec<String>,
@@ -117,9 +117,17 @@ pub fn method_name(row: &Row) -> String {
     if row.backend == "cpu" { row.method.clone() } else { format!("{} ({})", row.method, row.backend) }
 }
 
-/// Sorts names: the yardstick first.
-pub(crate) fn method_order(name: &str) -> (bool, String) {
-    (name != YARDSTICK, name.to_owned())
+/// The method that the project makes.
+const OURS: &str = "vlm";
+
+/// Sorts names: the yardstick, ours, and the others by name.
+pub(crate) fn method_order(name: &str) -> (u8, String) {
+    let rank = match name {
+        YARDSTICK => 0,
+        name if name.starts_with(OURS) => 1,
+        _ => 2,
+    };
+    (rank, name.to_owned())
 }
 
 /// The distinct values in order of first appearance.
@@ -220,8 +228,8 @@ mod tests {
         let names = |i: usize| -> Vec<(&str, usize)> {
             scenes[i].methods.iter().map(|method| (method.name.as_str(), method.series)).collect()
         };
-        assert_eq!(names(0), [("vlm", 2)]);
-        assert_eq!(names(1), [("thesis", 0), ("brute", 1)]);
+        assert_eq!(names(0), [("vlm", 1)]);
+        assert_eq!(names(1), [("thesis", 0), ("brute", 2)]);
     }
 
     #[test]

@@ -162,7 +162,7 @@ fn sheet(dir: &Path, scene: &str, camera: &str, rows: &[&Row]) -> Result<Sheet, 
 
 /// By method: the repeats of the setting with the least median error, the faster of equal ones.
 fn best_settings<'a>(rows: &[&'a Row]) -> Vec<(String, Vec<&'a Row>)> {
-    let mut methods: BTreeMap<(bool, String), BTreeMap<&str, Vec<&Row>>> = BTreeMap::new();
+    let mut methods: BTreeMap<(u8, String), BTreeMap<&str, Vec<&Row>>> = BTreeMap::new();
     for row in rows {
         let settings = methods.entry(method_order(&method_name(row))).or_default();
         settings.entry(&row.knob).or_default().push(row);

@@ -82,7 +82,7 @@ fn camera_section(scene: &SceneCurves, camera: &str, rows: &[&Row], sheets: bool
         spp.join(", "),
         "---:|".repeat(18),
     );
-    let mut settings: BTreeMap<((bool, String), &str), Vec<&Row>> = BTreeMap::new();
+    let mut settings: BTreeMap<((u8, String), &str), Vec<&Row>> = BTreeMap::new();
     for row in rows {
         settings.entry((method_order(&method_name(row)), &row.knob)).or_default().push(row);
     }
