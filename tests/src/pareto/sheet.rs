@@ -95,10 +95,11 @@ impl Sheet {
     }
 
     fn difference(&self, entry: &Entry, pixel: usize, scale: f64) -> [u8; 3] {
-        let (image, truth) = (entry.pixels[pixel], self.truth.pixels[pixel]);
-        if image == Vec3::ZERO && truth == Vec3::ZERO {
+        // A surface that one picture leaves black is lit in another.
+        if std::iter::once(&self.truth).chain(&self.methods).all(|entry| entry.pixels[pixel] == Vec3::ZERO) {
             return NOTHING;
         }
+        let (image, truth) = (entry.pixels[pixel], self.truth.pixels[pixel]);
         false_colour(f64::from(luminance(image) - luminance(truth)) / (scale * self.mean_luminance()))
     }
 
@@ -274,6 +275,18 @@ mod tests {
             "{dark:?} {bright:?}"
         );
         assert_eq!(same, false_colour(0.0));
+    }
+
+    #[test]
+    fn black_surface_is_no_background() {
+        let mut sheet = sheet(&[1.0, 1.0]);
+        for (pixel, lit) in [(3, 1.0), (4, 0.0)] {
+            sheet.truth.pixels[pixel] = Vec3::ZERO;
+            sheet.methods[0].pixels[pixel] = Vec3::ZERO;
+            sheet.methods[1].pixels[pixel] = Vec3::splat(lit);
+        }
+        let colour = |pixel| sheet.difference(&sheet.methods[0], pixel, 1.0);
+        assert_eq!((colour(3), colour(4)), (false_colour(0.0), NOTHING));
     }
 
     #[test]
