@@ -13,6 +13,7 @@ fn main() {
     println!("cargo::rerun-if-env-changed=VLM_ASSETS");
     println!("cargo::rerun-if-env-changed=VLM_REQUIRE_NPM");
     println!("cargo::rustc-env=VLM_ASSETS_FOLDER={}", assets.display());
+    find_python(&root);
     find_vulkan();
     for (name, needed, promised) in [
         ("has_scenes", assets.join("scenes/sponza.glb"), false),
@@ -24,6 +25,22 @@ fn main() {
         if promised || needed.exists() {
             println!("cargo::rustc-cfg={name}");
         }
+    }
+}
+
+/// The virtual environment with the packages of `python/requirements.txt`, which `tests/run` makes; or
+/// `VLM_REQUIRE_PYTHON=1` promises one. `VLM_PYTHON` may name another interpreter that has them.
+fn find_python(root: &Path) {
+    let python =
+        env::var_os("VLM_PYTHON").map_or_else(|| root.join("target/python/bin/python"), PathBuf::from);
+    let promised = env::var_os("VLM_REQUIRE_PYTHON").is_some_and(|value| value == "1");
+    println!("cargo::rerun-if-env-changed=VLM_PYTHON");
+    println!("cargo::rerun-if-env-changed=VLM_REQUIRE_PYTHON");
+    println!("cargo::rerun-if-changed={}", python.display());
+    println!("cargo::rustc-env=VLM_PYTHON={}", python.display());
+    println!("cargo::rustc-check-cfg=cfg(has_python)");
+    if promised || python.exists() {
+        println!("cargo::rustc-cfg=has_python");
     }
 }
 

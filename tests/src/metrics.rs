@@ -2,7 +2,9 @@
 
 use glam::Vec3;
 use serde::Serialize;
-use vlm_shaders::cpu::resolve::luminance;
+use vlm_shaders::cpu::resolve::{auto_exposure, encode_srgb, luminance, tone_map};
+
+use crate::flip::{PIXELS_PER_DEGREE, flip_map};
 
 /// The distance of a picture from the truth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -19,6 +21,9 @@ pub struct Metrics {
     /// Largest difference of the luminance's `a - b` between two neighbouring pixels, over the truth's mean luminance:
     /// an edge that is in `a` alone, or in `b` alone.
     pub largest_jump: f64,
+    /// Mean FLIP of the shown pictures, 0 to 1; only [`compare_shown`] finds it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flip: Option<f64>,
     /// Pixels that count.
     pub pixels: usize,
 }
@@ -36,7 +41,7 @@ pub struct Comparison<'a> {
     pub hit: &'a [bool],
 }
 
-/// Measures every distance; `None` if the buffers' sizes differ, no pixel counts, or the truth is black.
+/// Measures every distance but FLIP, which takes longer than all others together; `None` if the buffers' sizes differ, no pixel counts, or the truth is black.
 #[must_use]
 pub fn compare(comparison: &Comparison<'_>) -> Option<Metrics> {
     let Comparison { width, image, truth, hit } = *comparison;
@@ -62,8 +67,42 @@ pub fn compare(comparison: &Comparison<'_>) -> Option<Metrics> {
         signed_energy: mean_image / mean_truth - 1.0,
         p99: percentile(counted().map(|i| error(comparison, i).abs()).collect(), 0.99) / mean_luminance,
         largest_jump: largest_jump(comparison) / mean_luminance,
+        flip: None,
         pixels,
     })
+}
+
+/// As [`compare`], with FLIP (Andersson et al. 2020) at 67 pixels per degree: both buffers are shown as 8-bit sRGB with
+/// the exposure that suits the truth, black where nothing counts.
+#[must_use]
+pub fn compare_shown(comparison: &Comparison<'_>) -> Option<Metrics> {
+    let metrics = compare(comparison)?;
+    let counted = |buffer: &[Vec3]| -> Vec<Vec3> {
+        let pixels = buffer.iter().zip(comparison.hit);
+        pixels.map(|(&pixel, &hit)| if hit { pixel } else { Vec3::ZERO }).collect()
+    };
+    let (image, truth) = (counted(comparison.image), counted(comparison.truth));
+    let exposure = auto_exposure(&truth);
+    let shown = |buffer: &[Vec3]| -> Vec<[u8; 3]> {
+        buffer.iter().map(|&pixel| encode_srgb(tone_map(pixel * exposure))).collect()
+    };
+    let map = flip_map(comparison.width, &shown(&truth), &shown(&image), PIXELS_PER_DEGREE)?;
+    let counted = map.iter().zip(comparison.hit).filter(|(_, hit)| **hit).map(|(value, _)| value);
+    Some(Metrics { flip: Some(counted.sum::<f64>() / metrics.pixels as f64), ..metrics })
+}
+
+/// RMS of the difference of two frames over the truth's RMS, over pixels that count and channels: what flickers.
+/// `None` if sizes differ, no pixel counts, or the truth is black.
+#[must_use]
+pub fn frame_change(first: &[Vec3], second: &[Vec3], truth: &[Vec3], hit: &[bool]) -> Option<f64> {
+    if [first.len(), second.len(), truth.len()] != [hit.len(); 3] {
+        return None;
+    }
+    let squares = |f: &dyn Fn(usize) -> Vec3| -> f64 {
+        (0..hit.len()).filter(|&i| hit[i]).map(|i| f(i).as_dvec3().length_squared()).sum()
+    };
+    let truth = squares(&|i| truth[i]);
+    (truth > 0.0).then(|| (squares(&|i| second[i] - first[i]) / truth).sqrt())
 }
 
 /// Signed error of a pixel's luminance.
@@ -129,6 +168,39 @@ mod tests {
         let mut shifted = picture();
         shifted.rotate_right(1);
         assert!(measure(&shifted).relative_rmse > 0.05);
+    }
+
+    #[test]
+    fn the_shown_pictures_differ_where_the_buffers_do() {
+        let (truth, hit) = (picture(), vec![true; WIDTH * WIDTH]);
+        let flip = |image: &[Vec3], hit: &[bool]| {
+            let comparison = Comparison { width: WIDTH, image, truth: &truth, hit };
+            assert_eq!(compare(&comparison).unwrap().flip, None);
+            compare_shown(&comparison).unwrap().flip.unwrap()
+        };
+        assert_eq!(flip(&truth, &hit), 0.0);
+        let scaled = |factor: f32| -> Vec<Vec3> { truth.iter().map(|p| *p * factor).collect() };
+        let (little, more) = (flip(&scaled(1.05), &hit), flip(&scaled(1.5), &hit));
+        assert!(little > 0.005 && more > 2.0 * little, "{little} {more}");
+        let (mut spotted, mut without) = (truth.clone(), hit.clone());
+        spotted[100] = Vec3::splat(f32::MAX);
+        without[100] = false;
+        assert!(flip(&spotted, &hit) > 0.0);
+        assert_eq!(flip(&spotted, &without), 0.0);
+    }
+
+    #[test]
+    fn frames_that_differ_by_a_twentieth_change_by_it() {
+        let (truth, mut hit) = (picture(), vec![true; WIDTH * WIDTH]);
+        let mut second: Vec<Vec3> = truth.iter().map(|p| *p * 1.05).collect();
+        let change = frame_change(&truth, &second, &truth, &hit).unwrap();
+        assert!((change - 0.05).abs() < 1e-6);
+        assert_eq!(frame_change(&second, &second, &truth, &hit), Some(0.0));
+        second[7] = Vec3::splat(1e9);
+        hit[7] = false;
+        assert!(frame_change(&truth, &second, &truth, &hit).unwrap() < 0.051);
+        assert_eq!(frame_change(&truth, &second, &truth, &hit[1..]), None);
+        assert_eq!(frame_change(&truth, &second, &vec![Vec3::ZERO; hit.len()], &hit), None);
     }
 
     #[test]

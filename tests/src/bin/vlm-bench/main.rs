@@ -1,6 +1,7 @@
 //! `vlm-bench`: runs every method there is, for measurements.
 
 mod render;
+mod report;
 
 use std::process::ExitCode;
 
@@ -18,6 +19,8 @@ struct Cli {
 enum Command {
     /// Render a picture by any method, and compare it with a reference
     Render(render::RenderArgs),
+    /// Write the summary and the figures of a Pareto run anew
+    Report(report::ReportArgs),
     /// Form factors of a file of cases, or the stress test
     FormFactor(command::FormFactorArgs),
     /// Measure the form factor's throughput on one core
@@ -27,6 +30,7 @@ enum Command {
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Render(args) => render::run(&args),
+        Command::Report(args) => report::run(&args),
         Command::FormFactor(args) => command::run(&args),
         Command::Kernel(args) => {
             command::run_kernel(&args);

@@ -10,7 +10,7 @@ use vlm_bake::progress::Silent;
 use vlm_bake::render::{Method, RenderError, RenderOptions, RenderReport, Rendering, render};
 use vlm_bake::scene::{Camera, LoadOptions, Scene, load};
 use vlm_format::{GltfFile, VlmAsset, read_vlm};
-use vlm_tests::metrics::{Comparison, Metrics, compare};
+use vlm_tests::metrics::{Comparison, Metrics, compare_shown};
 use vlm_tests::thesis::{self, ThesisOptions};
 
 /// Flags of `vlm-bench render`: those of `vlm render`, and what only this command has.
@@ -169,6 +169,6 @@ fn compared(args: &RenderArgs, rendering: &Rendering) -> Result<Option<Metrics>,
     let hit: Vec<bool> = rendering.gbuffer.points.iter().map(Option::is_some).collect();
     let comparison =
         Comparison { width: width as usize, image: &rendering.indirect, truth: &truth, hit: &hit };
-    let metrics = compare(&comparison);
+    let metrics = compare_shown(&comparison);
     Ok(Some(metrics.ok_or_else(|| format!("{}: black, so nothing can be relative to it", path.display()))?))
 }

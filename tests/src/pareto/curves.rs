@@ -1,0 +1,268 @@
+//! The rows of a run by scene, method and setting: medians and spread over repeats, and means over a scene's cameras.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::front::{Sample, front, front_samples};
+use super::row::Row;
+
+/// The method that all ratios are relative to.
+pub const YARDSTICK: &str = "thesis";
+
+/// A median with the least and greatest value that it stands for.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spread {
+    /// The middle value, or the mean of the two.
+    pub median: f64,
+    /// The least value.
+    pub low: f64,
+    /// The greatest value.
+    pub high: f64,
+}
+
+impl Spread {
+    /// Of any values; `None` without any.
+    #[must_use]
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
+        let mut values: Vec<f64> = values.into_iter().collect();
+        values.sort_by(f64::total_cmp);
+        let (low, high) = (*values.first()?, *values.last()?);
+        let middle = values.len() / 2;
+        let median = if values.len().is_multiple_of(2) {
+            0.5 * (values[middle - 1] + values[middle])
+        } else {
+            values[middle]
+        };
+        Some(Self { median, low, high })
+    }
+}
+
+/// A method's setting in a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    /// `key=value` pairs.
+    pub knob: String,
+    /// Per repeat, geometric means over the cameras.
+    pub repeats: BTreeMap<u32, Sample>,
+    /// Time of a frame over the repeats.
+    pub seconds: Spread,
+    /// Model error over the repeats.
+    pub error: Spread,
+    /// Algorithm error over the repeats, where the method has area lights.
+    pub algorithm: Option<Spread>,
+    /// False if any camera's truth is too noisy to judge any repeat.
+    pub suffices: bool,
+}
+
+/// A method's settings in a scene, from fast to slow.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MethodCurve {
+    /// The method's name, with its backend where that is not the processor.
+    pub name: String,
+    /// Its number in the whole run, for its colour.
+    pub series: usize,
+    /// By median time.
+    pub settings: Vec<Setting>,
+}
+
+/// A scene's methods.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneCurves {
+    /// The scene's name.
+    pub scene: String,
+    /// Its cameras, in the order of the rows.
+    pub cameras: Vec<String>,
+    /// The yardstick, ours, then by name.
+    pub methods: Vec<MethodCurve>,
+    /// Settings that lack a camera in every repeat, and so have no place in a mean over cameras.
+    pub incomplete: Vec<String>,
+}
+
+impl MethodCurve {
+    /// The medians of each setting.
+    #[must_use]
+    pub fn medians(&self) -> Vec<Sample> {
+        let sample = |setting: &Setting| Sample {
+            seconds: setting.seconds.median,
+            error: setting.error.median,
+            suffices: setting.suffices,
+        };
+        self.settings.iter().map(sample).collect()
+    }
+
+    /// The settings on the front of the medians.
+    #[must_use]
+    pub fn front(&self) -> Vec<&Setting> {
+        front(&self.medians()).into_iter().map(|i| &self.settings[i]).collect()
+    }
+
+    /// The front that a single repeat shows.
+    #[must_use]
+    pub fn front_of(&self, repeat: u32) -> Vec<Sample> {
+        let samples: Vec<Sample> =
+            self.settings.iter().filter_map(|setting| setting.repeats.get(&repeat).copied()).collect();
+        front_samples(&samples)
+    }
+
+    /// The repeats that any setting has, ascending.
+    #[must_use]
+    pub fn repeats(&self) -> Vec<u32> {
+        let repeats = self.settings.iter().flat_map(|setting| setting.repeats.keys().copied());
+        repeats.collect::<BTreeSet<u32>>().into_iter().collect()
+    }
+}
+
+/// The name under which a row's method appears.
+#[must_use]
+pub fn method_name(row: &Row) -> String {
+    if row.backend == "cpu" { row.method.clone() } else { format!("{} ({})", row.method, row.backend) }
+}
+
+/// The method that the project makes.
+const OURS: &str = "vlm";
+
+/// Sorts names: the yardstick, ours, and the others by name.
+pub(crate) fn method_order(name: &str) -> (u8, String) {
+    let rank = match name {
+        YARDSTICK => 0,
+        name if name.starts_with(OURS) => 1,
+        _ => 2,
+    };
+    (rank, name.to_owned())
+}
+
+/// The distinct values in order of first appearance.
+pub(crate) fn distinct<'a>(values: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let mut seen = BTreeSet::new();
+    values.filter(|value| seen.insert(*value)).map(str::to_owned).collect()
+}
+
+/// Groups the rows by scene, in the order of the rows.
+#[must_use]
+pub fn scene_curves(rows: &[Row]) -> Vec<SceneCurves> {
+    let mut all_methods =
+        distinct(rows.iter().map(method_name).collect::<Vec<_>>().iter().map(String::as_str));
+    all_methods.sort_by_cached_key(|name| method_order(name));
+    let scenes = distinct(rows.iter().map(|row| row.scene.as_str()));
+    scenes.into_iter().map(|scene| one_scene(rows, scene, &all_methods)).collect()
+}
+
+fn one_scene(rows: &[Row], scene: String, all_methods: &[String]) -> SceneCurves {
+    let rows: Vec<&Row> = rows.iter().filter(|row| row.scene == scene).collect();
+    let cameras = distinct(rows.iter().map(|row| row.camera.as_str()));
+    let mut incomplete = Vec::new();
+    let mut methods = Vec::new();
+    for (series, name) in all_methods.iter().enumerate() {
+        let mut by_knob: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
+        for row in rows.iter().filter(|row| method_name(row) == *name) {
+            by_knob.entry(&row.knob).or_default().push(row);
+        }
+        let mut settings = Vec::new();
+        for (knob, rows) in by_knob {
+            match setting(knob, &rows, cameras.len()) {
+                Some(setting) => settings.push(setting),
+                None => incomplete.push(format!("{name} {knob}").trim().to_owned()),
+            }
+        }
+        settings.sort_by(|a: &Setting, b| a.seconds.median.total_cmp(&b.seconds.median));
+        if !settings.is_empty() {
+            methods.push(MethodCurve { name: name.clone(), series, settings });
+        }
+    }
+    SceneCurves { scene, cameras, methods, incomplete }
+}
+
+fn setting(knob: &str, rows: &[&Row], cameras: usize) -> Option<Setting> {
+    let mut by_repeat: BTreeMap<u32, Vec<&Row>> = BTreeMap::new();
+    for row in rows {
+        by_repeat.entry(row.repeat).or_default().push(row);
+    }
+    by_repeat.retain(|_, rows| rows.len() == cameras);
+    let sample = |rows: &Vec<&Row>| Sample {
+        seconds: geometric_mean(rows.iter().map(|row| row.frame_seconds())),
+        error: geometric_mean(rows.iter().map(|row| row.relative_rmse)),
+        suffices: rows.iter().all(|row| row.truth_suffices),
+    };
+    let algorithm = |rows: &Vec<&Row>| -> Option<f64> {
+        Some(geometric_mean(
+            rows.iter().map(|row| row.algorithm_rmse).collect::<Option<Vec<f64>>>()?.into_iter(),
+        ))
+    };
+    let repeats: BTreeMap<u32, Sample> =
+        by_repeat.iter().map(|(&repeat, rows)| (repeat, sample(rows))).collect();
+    Some(Setting {
+        knob: knob.to_owned(),
+        seconds: Spread::of(repeats.values().map(|sample| sample.seconds))?,
+        error: Spread::of(repeats.values().map(|sample| sample.error))?,
+        algorithm: Spread::of(by_repeat.values().filter_map(algorithm)),
+        suffices: repeats.values().all(|sample| sample.suffices),
+        repeats,
+    })
+}
+
+/// Ratios between methods stay the same whichever camera is cheap or dark, which no other mean gives.
+fn geometric_mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len() as f64;
+    if count == 1.0 { values.sum() } else { (values.map(f64::ln).sum::<f64>() / count).exp() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pareto::made_up::row;
+
+    #[test]
+    fn spreads_have_a_middle() {
+        assert_eq!(Spread::of([3.0, 1.0, 2.0]), Some(Spread { median: 2.0, low: 1.0, high: 3.0 }));
+        assert_eq!(Spread::of([4.0, 1.0]).unwrap().median, 2.5);
+        assert_eq!(Spread::of([]), None);
+    }
+
+    #[test]
+    fn methods_keep_their_number_and_the_yardstick_leads() {
+        let rows = [
+            row("a", "c", "vlm", "n=1", 0, 1.0, 0.1),
+            row("b", "c", "brute", "", 0, 1.0, 0.1),
+            row("b", "c", "thesis", "", 0, 1.0, 0.1),
+        ];
+        let scenes = scene_curves(&rows);
+        let names = |i: usize| -> Vec<(&str, usize)> {
+            scenes[i].methods.iter().map(|method| (method.name.as_str(), method.series)).collect()
+        };
+        assert_eq!(names(0), [("vlm", 1)]);
+        assert_eq!(names(1), [("thesis", 0), ("brute", 2)]);
+    }
+
+    #[test]
+    fn cameras_weigh_by_ratio_and_must_all_be_there() {
+        let rows = [
+            row("a", "left", "vlm", "n=1", 0, 1.0, 0.1),
+            row("a", "right", "vlm", "n=1", 0, 4.0, 0.4),
+            row("a", "left", "vlm", "n=1", 1, 1.0, 0.1),
+            row("a", "left", "vlm", "n=2", 0, 1.0, 0.1),
+        ];
+        let scene = &scene_curves(&rows)[0];
+        let settings = &scene.methods[0].settings;
+        assert_eq!((settings.len(), settings[0].repeats.len()), (1, 1), "repeat 1 lacks a camera");
+        assert!((settings[0].seconds.median - 2.0).abs() < 1e-12);
+        assert!((settings[0].error.median - 0.2).abs() < 1e-12);
+        assert_eq!(scene.incomplete, ["vlm n=2"]);
+    }
+
+    #[test]
+    fn one_doubtful_truth_makes_the_setting_doubtful() {
+        let mut rows = [row("a", "c", "vlm", "", 0, 1.0, 0.1), row("a", "c", "vlm", "", 1, 3.0, 0.1)];
+        assert!(scene_curves(&rows)[0].methods[0].settings[0].suffices);
+        rows[1].truth_suffices = false;
+        let setting = scene_curves(&rows)[0].methods[0].settings[0].clone();
+        assert!(!setting.suffices);
+        assert_eq!(setting.seconds, Spread { median: 2.0, low: 1.0, high: 3.0 });
+    }
+
+    #[test]
+    fn backends_are_methods_of_their_own() {
+        let mut gpu = row("a", "c", "vlm", "", 0, 1.0, 0.1);
+        gpu.backend = "gpu".to_owned();
+        let scene = &scene_curves(&[gpu, row("a", "c", "vlm", "", 0, 2.0, 0.1)])[0];
+        assert_eq!(scene.methods.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(), ["vlm", "vlm (gpu)"]);
+    }
+}
