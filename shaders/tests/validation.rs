@@ -49,9 +49,9 @@ fn light_geometry_has_the_layout_of_its_mirror() {
         normal,
         altitude_squared,
         v1,
-        padding_1,
+        base_squared,
         v2,
-        padding_2
+        padding
     );
     assert_eq!(found, expected);
     assert_eq!(*span as usize, size_of::<LightGeometry>());

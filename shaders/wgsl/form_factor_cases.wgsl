@@ -10,6 +10,8 @@ struct Receiver {
 @group(0) @binding(0) var<storage, read> lights: array<LightGeometry>;
 @group(0) @binding(1) var<storage, read> receivers: array<Receiver>;
 @group(0) @binding(2) var<storage, read_write> results: array<f32>;
+// Zero for the exact form alone.
+@group(0) @binding(3) var<storage, read> bound: ErrorBound;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -17,6 +19,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if i >= arrayLength(&results) {
         return;
     }
-    let receiver = receivers[i];
-    results[i] = form_factor(lights[i], receiver.x, vec3f(receiver.n_x, receiver.n_yz));
+    let x = receivers[i].x;
+    let n = vec3f(receivers[i].n_x, receivers[i].n_yz);
+    if bound.second_moment > 0.0 {
+        results[i] = form_factor_within(lights[i], x, n, bound);
+    } else {
+        results[i] = form_factor(lights[i], x, n);
+    }
 }

@@ -6,7 +6,6 @@
 //! every light; what does not fit is dropped. A pixel sums the lights of its cell by the textbook formula (Baum,
 //! Rushmeier, Winget 1989) in single precision with the library's arc cosine.
 
-use std::f32::consts::TAU;
 use std::time::Instant;
 
 use glam::{UVec3, Vec3};
@@ -19,6 +18,8 @@ use vlm_bake::shade::TraceScene;
 use vlm_format::VlmAsset;
 use vlm_shaders::cpu::form_factor::LightGeometry;
 use vlm_shaders::cpu::gather::{Gathered, Receiver};
+
+use crate::form_factor::textbook::{EdgeForm, textbook_form_factor};
 
 /// Ends a list that is not full.
 const NULL: u32 = u32::MAX;
@@ -150,41 +151,14 @@ pub fn gather(lit: &LitScene<'_>, list: impl Iterator<Item = u32>, receiver: &Re
             continue;
         }
         gathered.pairs += 1;
-        let form_factor =
-            textbook_form_factor(&lit.lights.geometry[light], receiver.position, receiver.normal);
+        let form_factor = by_acos(&lit.lights.geometry[light], receiver.position, receiver.normal);
         gathered.irradiance += lit.radiosity[light] * form_factor;
     }
     gathered
 }
 
-/// `1/(2 pi) sum acos(p_i . p_j) n . unit(p_i x p_j)` over the unit vectors to the corners of the polygon above the
-/// horizon, in single precision throughout.
-#[must_use]
-pub fn textbook_form_factor(light: &LightGeometry, x: Vec3, n: Vec3) -> f32 {
-    let corners = light.corners().map(|c| c - x);
-    if light.normal.dot(corners[0]) >= 0.0 {
-        return 0.0;
-    }
-    let heights = corners.map(|r| n.dot(r));
-    let mut polygon = [Vec3::ZERO; 4];
-    let mut count = 0;
-    for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-        if heights[i] >= 0.0 {
-            polygon[count] = corners[i].normalize_or_zero();
-            count += 1;
-        }
-        if (heights[i] >= 0.0) != (heights[j] >= 0.0) {
-            let t = heights[i] / (heights[i] - heights[j]);
-            polygon[count] = corners[i].lerp(corners[j], t).normalize_or_zero();
-            count += 1;
-        }
-    }
-    let mut sum = 0.0;
-    for i in 0..count {
-        let (p, q) = (polygon[i], polygon[if i + 1 == count { 0 } else { i + 1 }]);
-        sum += p.dot(q).clamp(-1.0, 1.0).acos() * n.dot(p.cross(q).normalize_or_zero());
-    }
-    (-sum / TAU).max(0.0)
+fn by_acos(light: &LightGeometry, x: Vec3, n: Vec3) -> f32 {
+    textbook_form_factor(EdgeForm::Acos, light.corners(), light.normal, x, n)
 }
 
 /// A picture by the thesis' method, and what its lists could not hold.
@@ -255,9 +229,9 @@ mod tests {
     #[test]
     fn textbook_formula_agrees_where_single_precision_suffices() {
         for (x, n) in [(Vec3::new(0.3, 0.1, 2.0), -Vec3::Z), (Vec3::new(1.5, 0.0, 1.5), -Vec3::X)] {
-            let (textbook, exact) = (textbook_form_factor(&light(), x, n), form_factor(&light(), x, n));
+            let (textbook, exact) = (by_acos(&light(), x, n), form_factor(&light(), x, n));
             assert!(exact > 0.01 && (textbook / exact - 1.0).abs() < 1e-3, "{textbook} {exact}");
         }
-        assert_eq!(textbook_form_factor(&light(), Vec3::ZERO, Vec3::Z), 0.0, "behind the light");
+        assert_eq!(by_acos(&light(), Vec3::ZERO, Vec3::Z), 0.0, "behind the light");
     }
 }

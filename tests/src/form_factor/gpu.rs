@@ -1,11 +1,12 @@
 //! The form factor on a GPU: the WGSL shell over the same cases.
 
 use bytemuck::{Pod, Zeroable};
-use vlm_shaders::cpu::form_factor::LightGeometry;
+use vlm_shaders::cpu::form_factor::{ErrorBound, LightGeometry};
 use vlm_shaders::wgsl;
 use wgpu::util::DeviceExt as _;
 
 use super::case::Case;
+use super::textbook::EdgeForm;
 
 /// Invocations per workgroup, as in the shader.
 const WORKGROUP: u32 = 64;
@@ -40,11 +41,23 @@ pub struct GpuFormFactor {
 }
 
 impl GpuFormFactor {
-    /// Takes the first Vulkan adapter.
+    /// The project's form factor on the first Vulkan adapter.
     ///
     /// # Errors
     /// Where there is none or it gives no device.
     pub fn new() -> Result<Self, GpuError> {
+        Self::with_shader(&wgsl::form_factor_cases())
+    }
+
+    /// The textbook forms, see [`GpuFormFactor::evaluate_textbook`].
+    ///
+    /// # Errors
+    /// As [`GpuFormFactor::new`].
+    pub fn textbook() -> Result<Self, GpuError> {
+        Self::with_shader(&format!("{}\n{}", wgsl::FORM_FACTOR, include_str!("textbook.wgsl")))
+    }
+
+    fn with_shader(source: &str) -> Result<Self, GpuError> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         descriptor.backends = wgpu::Backends::VULKAN;
         let instance = wgpu::Instance::new(descriptor);
@@ -54,7 +67,7 @@ impl GpuFormFactor {
             .map_err(|error| GpuError::Device(error.to_string()))?;
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("form_factor_cases"),
-            source: wgpu::ShaderSource::Wgsl(wgsl::form_factor_cases().into()),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
         });
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some("form_factor_cases"),
@@ -67,11 +80,32 @@ impl GpuFormFactor {
         Ok(Self { name: adapter.get_info().name, device, queue, pipeline })
     }
 
-    /// One form factor per case.
+    /// One exact form factor per case.
     ///
     /// # Errors
     /// If the device is lost.
     pub fn evaluate(&self, cases: &[Case]) -> Result<Vec<f32>, GpuError> {
+        self.evaluate_within(cases, &ErrorBound::default())
+    }
+
+    /// One form factor per case by a textbook form; only after [`GpuFormFactor::textbook`].
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn evaluate_textbook(&self, form: EdgeForm, cases: &[Case]) -> Result<Vec<f32>, GpuError> {
+        let choice = match form {
+            EdgeForm::Acos => 0.0,
+            EdgeForm::Atan2 => 1.0,
+            EdgeForm::LtcFit => 2.0,
+        };
+        self.evaluate_within(cases, &ErrorBound { centroid: choice, second_moment: 0.0 })
+    }
+
+    /// One form factor per case, by the cheapest form that keeps within `bound`.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn evaluate_within(&self, cases: &[Case], bound: &ErrorBound) -> Result<Vec<f32>, GpuError> {
         if cases.is_empty() {
             return Ok(Vec::new());
         }
@@ -86,7 +120,8 @@ impl GpuFormFactor {
         let results =
             self.buffer("results", size, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
         let back = self.buffer("back", size, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
-        let bindings = [&lights, &receivers, &results];
+        let bound = self.input("bound", bytemuck::bytes_of(bound));
+        let bindings = [&lights, &receivers, &results, &bound];
         let entries: Vec<_> = (0..)
             .zip(bindings)
             .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })

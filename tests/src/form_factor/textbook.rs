@@ -18,12 +18,18 @@ pub enum EdgeForm {
     LtcFit,
 }
 
-/// The form factor of a case by the sum over the edges of the clipped polygon, each edge by `form`.
+/// The form factor of a case, see [`textbook_form_factor`].
 #[must_use]
 pub fn textbook(form: EdgeForm, case: &Case) -> f32 {
-    let Case { corners, x, n } = *case;
+    let [a, b, c] = case.corners;
+    textbook_form_factor(form, case.corners, (b - a).cross(c - a), case.x, case.n)
+}
+
+/// `1/(2 pi)` times the sum over the edges of the polygon above the horizon of `Theta n . unit(p_i x p_j)`, each edge by
+/// `form`, in single precision throughout. `normal` is the light's, of any length.
+#[must_use]
+pub fn textbook_form_factor(form: EdgeForm, corners: [Vec3; 3], normal: Vec3, x: Vec3, n: Vec3) -> f32 {
     let r = corners.map(|v| v - x);
-    let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
     if normal.dot(r[0]) >= 0.0 {
         return 0.0;
     }

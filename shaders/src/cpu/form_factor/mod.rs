@@ -13,6 +13,7 @@ mod clip;
 mod near;
 mod lanes;
 mod moments;
+mod operations;
 
 use std::f32::consts::{FRAC_1_PI, TAU};
 
@@ -21,6 +22,7 @@ use glam::Vec3;
 pub use lanes::{Receivers, form_factors};
 pub use light::LightGeometry;
 pub use moments::{ErrorBound, centroid_form_factor, form_factor_within, second_moment_form_factor};
+pub use operations::far_operations;
 
 use clip::{Heights, clip_at_horizon};
 use far::far_triangle;

@@ -26,7 +26,8 @@ const SECOND_MOMENT_ERROR: f32 = 0.12;
 const FADE_START: f32 = 0.7;
 
 /// How large a light may look for each cheap form: made once from the error bound.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct ErrorBound {
     /// Greatest `tau^2` of the centroid form.
     pub centroid: f32,
@@ -61,7 +62,7 @@ pub fn form_factor_within(light: &LightGeometry, x: Vec3, n: Vec3, bound: &Error
 /// `N.n / r^4` at the centroid. The light must be wholly above the horizon, or its part below counts negative.
 #[must_use]
 pub fn centroid_form_factor(light: &LightGeometry, x: Vec3, n: Vec3) -> f32 {
-    to_unit(Centroid::new(light, x, n).form_factor())
+    to_unit(Centroid::new(light, x, n).first_moment())
 }
 
 /// The centroid form and its second-order term. The light must be wholly above the horizon.
@@ -72,7 +73,7 @@ pub fn second_moment_form_factor(light: &LightGeometry, x: Vec3, n: Vec3) -> f32
 
 fn cheap_form_factor(light: &LightGeometry, n: Vec3, seen: &Centroid, bound: &ErrorBound) -> f32 {
     let share = fade(seen.tau_squared, bound.centroid);
-    let centroid = if share < 1.0 { seen.form_factor() } else { 0.0 };
+    let centroid = if share < 1.0 { seen.first_moment() } else { 0.0 };
     let second = if share > 0.0 { seen.second_moment(light, n) } else { 0.0 };
     centroid + share * (second - centroid)
 }
@@ -115,7 +116,7 @@ impl Centroid {
         if clearance_squared > 0.0 { fade(reach_squared / clearance_squared, 1.0) } else { 1.0 }
     }
 
-    fn form_factor(&self) -> f32 {
+    fn first_moment(&self) -> f32 {
         self.facing * self.n_c.max(0.0) * self.inverse_square * self.inverse_square / TAU
     }
 

@@ -1,0 +1,73 @@
+// The textbook forms of the form factor on the GPU, by the built-in functions: what the kernel is measured against.
+// Appended to shared/form_factor.wgsl; bindings as in form_factor_cases.wgsl.
+
+struct Receiver {
+    x: vec3f,
+    n_x: f32,
+    n_yz: vec2f,
+    padding: vec2f,
+}
+
+@group(0) @binding(0) var<storage, read> lights: array<LightGeometry>;
+@group(0) @binding(1) var<storage, read> receivers: array<Receiver>;
+@group(0) @binding(2) var<storage, read_write> results: array<f32>;
+// `centroid` chooses the edge's form: 0 acos, 1 atan2, 2 the LTC fit.
+@group(0) @binding(3) var<storage, read> bound: ErrorBound;
+
+fn edge_term(p: vec3f, q: vec3f, n: vec3f) -> f32 {
+    let c = cross(p, q);
+    let cosine = dot(p, q);
+    let c_length = length(c);
+    if bound.centroid > 1.5 {
+        let y = abs(cosine);
+        let a = 0.8543985 + (0.4965155 + 0.0145206 * y) * y;
+        let b = 3.417594 + (4.1616724 + y) * y;
+        let v = a / b;
+        let beyond = 0.5 * inverseSqrt(max(1.0 - cosine * cosine, 1e-7)) - v;
+        return select(beyond, v, cosine > 0.0) * 6.28318531 * dot(n, c);
+    }
+    if !(c_length > 0.0) {
+        return 0.0;
+    }
+    var theta = acos(clamp(cosine, -1.0, 1.0));
+    if bound.centroid > 0.5 {
+        theta = atan2(c_length, cosine);
+    }
+    return theta / c_length * dot(n, c);
+}
+
+fn textbook(light: LightGeometry, x: vec3f, n: vec3f) -> f32 {
+    let r = array<vec3f, 3>(light.v0 - x, light.v1 - x, light.v2 - x);
+    if dot(light.normal, r[0]) >= 0.0 {
+        return 0.0;
+    }
+    var polygon: array<vec3f, 4>;
+    var count = 0u;
+    for (var i = 0u; i < 3u; i++) {
+        let j = (i + 1u) % 3u;
+        let z_i = dot(n, r[i]);
+        let z_j = dot(n, r[j]);
+        if z_i >= 0.0 && count < 4u {
+            polygon[count] = normalize(r[i]);
+            count++;
+        }
+        if (z_i >= 0.0) != (z_j >= 0.0) && count < 4u {
+            polygon[count] = normalize(r[i] + (r[j] - r[i]) * (z_i / (z_i - z_j)));
+            count++;
+        }
+    }
+    var sum = 0.0;
+    for (var i = 0u; i < count; i++) {
+        sum += edge_term(polygon[i], polygon[(i + 1u) % count], n);
+    }
+    return clamp(-sum * INVERSE_TAU, 0.0, 1.0);
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    let i = id.x;
+    if i >= arrayLength(&results) {
+        return;
+    }
+    results[i] = textbook(lights[i], receivers[i].x, vec3f(receivers[i].n_x, receivers[i].n_yz));
+}
