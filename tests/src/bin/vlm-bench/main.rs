@@ -1,6 +1,7 @@
 //! `vlm-bench`: runs every method there is, for measurements.
 
 mod render;
+mod pareto;
 
 use std::process::ExitCode;
 
@@ -18,6 +19,8 @@ struct Cli {
 enum Command {
     /// Render a picture by any method, and compare it with a reference
     Render(render::RenderArgs),
+    /// Run every method over its knobs: time against error
+    Pareto(pareto::ParetoArgs),
     /// Form factors of a file of cases, or the stress test
     FormFactor(command::FormFactorArgs),
     /// Measure the form factor's throughput on one core
@@ -26,15 +29,16 @@ enum Command {
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        Command::Render(args) => render::run(&args),
-        Command::FormFactor(args) => command::run(&args),
+        Command::Render(args) => render::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Pareto(args) => pareto::command(&args),
+        Command::FormFactor(args) => command::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Kernel(args) => {
             command::run_kernel(&args);
-            Ok(())
+            Ok(ExitCode::SUCCESS)
         }
     };
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(error) => {
             eprintln!("error: {error}");
             ExitCode::from(2)
