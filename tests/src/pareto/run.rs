@@ -309,8 +309,7 @@ fn judge(
     Ok(rows)
 }
 
-/// The one place where FLIP enters a row.
-// TODO-free by design: the metric itself is not part of this tree yet, and 0 says "not measured".
+/// Where FLIP enters a row: 0 as long as [`Metrics`] has none.
 fn flip(_metrics: &Metrics) -> f64 {
     0.0
 }

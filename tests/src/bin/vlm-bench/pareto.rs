@@ -20,7 +20,7 @@ pub struct ParetoArgs {
     /// Folder of the run
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Size of the pictures in pixels [default: 128x128 for own scenes, 128x72 for others]
+    /// Size of the pictures in pixels [default: 192x192 for own scenes, 256x144 for others]
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<(u32, u32)>,
     /// Times that everything is rendered, 2 or more
@@ -49,7 +49,7 @@ pub fn command(args: &ParetoArgs) -> Result<ExitCode, Box<dyn Error>> {
         repeats: args.repeats,
         methods: args.methods.clone(),
         cache: args.cache.clone(),
-        spp: Spp { first: 256.min(args.spp), most: args.spp },
+        spp: Spp { first: 1024.min(args.spp), most: args.spp },
     };
     let outcome = run(&options, &|line| eprintln!("{line}"))?;
     let rows = pareto::report(&args.out)?;

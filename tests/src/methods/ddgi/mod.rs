@@ -16,6 +16,7 @@ use std::time::Instant;
 
 use glam::Vec3;
 use rayon::prelude::*;
+use vlm_bake::grid::DEFAULT_CELLS;
 use vlm_bake::render::PhaseSeconds;
 
 use super::Entry;
@@ -27,12 +28,11 @@ use update::{ProbeLight, RaySet};
 pub const ENTRY: Entry =
     Entry { name: "ddgi", sweep, proof: || Box::new(Ddgi { cells: 12.0, rays: 1024 }), tolerance: 0.05 };
 
-/// Cells along the longest axis that the baker chooses by default, so that probes stand at our corners.
-const OUR_CELLS: f32 = 24.0;
-
 fn sweep(_stage: &Stage<'_>) -> Vec<Box<dyn Method>> {
     let mut methods: Vec<Box<dyn Method>> = Vec::new();
-    for cells in [OUR_CELLS / 4.0, OUR_CELLS / 2.0, OUR_CELLS] {
+    // The last has its probes where the baker's grid has its corners.
+    let ours = DEFAULT_CELLS as f32;
+    for cells in [ours / 4.0, ours / 2.0, ours] {
         for rays in [64, 256] {
             methods.push(Box::new(Ddgi { cells, rays }));
         }

@@ -28,14 +28,12 @@ pub const ENTRY: Entry = Entry {
     tolerance: 0.02,
 };
 
+/// Lights and clamp: the more lights, the less light stands in for each, and the smaller the bound may be.
+const SWEEP: [(u32, f32); 8] =
+    [(16, 0.1), (64, 0.1), (256, 0.1), (1024, 0.1), (1024, 0.03), (4096, 0.03), (4096, 0.01), (16384, 0.01)];
+
 fn sweep(_stage: &Stage<'_>) -> Vec<Box<dyn Method>> {
-    let mut methods: Vec<Box<dyn Method>> = Vec::new();
-    for lights in [16, 64, 256, 1024] {
-        for clamp in [0.1, 0.02] {
-            methods.push(Box::new(InstantRadiosity { lights, clamp }));
-        }
-    }
-    methods
+    SWEEP.map(|(lights, clamp)| Box::new(InstantRadiosity { lights, clamp }) as Box<dyn Method>).into()
 }
 
 /// The method at one setting.
