@@ -71,28 +71,36 @@ pub fn prove(entry: &Entry) -> Result<(), Refusal> {
 /// # Errors
 /// The first scene whose answer it misses.
 pub fn prove_method(method: &dyn Method, tolerance: f64) -> Result<(), Refusal> {
-    for Known { name: scene, scene: built, camera, irradiance } in known_scenes() {
-        let method_name = method.name();
-        let failed = |error| Refusal::Failed { method: method_name, scene, error };
-        let found = mean_irradiance(method, &built, &camera).map_err(failed)?;
-        let known = if method.gives_indirect_light() { irradiance } else { Vec3::ZERO };
-        let allowed = known * tolerance as f32;
-        // NaN fails this comparison.
-        if !(found - known).abs().cmple(allowed).all() {
-            return Err(Refusal::Wrong { method: method_name, scene, found, known, tolerance });
-        }
+    for known in known_scenes() {
+        let failed = |error| Refusal::Failed { method: method.name(), scene: known.name, error };
+        let found = mean_irradiance(method, &known).map_err(failed)?;
+        check(method, &known, found, tolerance)?;
     }
     Ok(())
+}
+
+/// Judges what a method gave in one scene.
+///
+/// # Errors
+/// If it is not the known answer within `tolerance`, relative, in every channel.
+pub fn check(method: &dyn Method, known: &Known, found: Vec3, tolerance: f64) -> Result<(), Refusal> {
+    let answer = if method.gives_indirect_light() { known.irradiance } else { Vec3::ZERO };
+    // NaN fails this comparison.
+    if (found - answer).abs().cmple(answer * tolerance as f32).all() {
+        return Ok(());
+    }
+    let (method, scene) = (method.name(), known.name);
+    Err(Refusal::Wrong { method, scene, found, known: answer, tolerance })
 }
 
 /// The mean over the picture of what a method gives, lx.
 ///
 /// # Errors
 /// If the method gives none.
-pub fn mean_irradiance(method: &dyn Method, scene: &Scene, camera: &Camera) -> Result<Vec3, MethodError> {
-    let trace = TraceScene::new(scene);
+pub fn mean_irradiance(method: &dyn Method, known: &Known) -> Result<Vec3, MethodError> {
+    let trace = TraceScene::new(&known.scene);
     let stage = Stage::new(&trace);
-    let view = View::new(&trace, camera, (SIZE, SIZE));
+    let view = View::new(&trace, &known.camera, (SIZE, SIZE));
     let picture = method.prepare(&stage)?.render(&view, 0)?;
     Ok(picture.indirect.iter().sum::<Vec3>() / picture.indirect.len().max(1) as f32)
 }

@@ -26,7 +26,7 @@ use update::{ProbeLight, RaySet};
 
 /// The method's line in the table. Probes interpolate what varies between them: that is the tolerance.
 pub const ENTRY: Entry =
-    Entry { name: "ddgi", sweep, proof: || Box::new(Ddgi { cells: 12.0, rays: 1024 }), tolerance: 0.05 };
+    Entry { name: "ddgi", sweep, proof: || Box::new(Ddgi { cells: 12.0, rays: 512 }), tolerance: 0.05 };
 
 fn sweep(_stage: &Stage<'_>) -> Vec<Box<dyn Method>> {
     let mut methods: Vec<Box<dyn Method>> = Vec::new();

@@ -76,6 +76,7 @@ mod tests {
         let texels: Vec<f32> = (0..32 * 32).map(|i| value(texel_direction(i, 32))).collect();
         let error = |d: Vec3| (sample(&texels, 32, d) - value(d)).abs();
         let worst = (0..2000).map(|i| error(fibonacci_direction(i, 2000))).fold(0.0, f32::max);
-        assert!(worst < 0.02, "{worst}: the seams included");
+        // The map bends at the octahedron's edges, where interpolation cuts the corner; a wrong seam errs by 1.
+        assert!(worst < 0.03, "{worst}");
     }
 }
