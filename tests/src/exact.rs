@@ -31,7 +31,8 @@ pub struct ExactPixels {
 }
 
 impl ExactPixels {
-    /// Sums the lights at up to [`MOST_PIXELS`] pixels, fewer where there are many lights. A light adds nothing to a
+    /// Sums the lights at up to 1024 pixels, evenly spread, and at fewer (2 million pairs, 64 pixels at least) where there are
+    /// many lights. A light adds nothing to a
     /// receiver of its own tag, nor where it lies wholly behind the receiver's surface.
     ///
     /// # Errors

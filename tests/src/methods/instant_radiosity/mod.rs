@@ -28,12 +28,18 @@ pub const ENTRY: Entry = Entry {
     tolerance: 0.02,
 };
 
-/// Lights and clamp: the more lights, the less light stands in for each, and the smaller the bound may be.
-const SWEEP: [(u32, f32); 8] =
-    [(16, 0.1), (64, 0.1), (256, 0.1), (1024, 0.1), (1024, 0.03), (4096, 0.03), (4096, 0.01), (16384, 0.01)];
+/// Lights and clamp in a room: the more lights, the less light stands in for each, and the smaller the bound may be.
+const SWEEP: [(u32, f32); 7] =
+    [(16, 0.1), (64, 0.1), (256, 0.1), (1024, 0.1), (1024, 0.05), (4096, 0.05), (4096, 0.025)];
 
-fn sweep(_stage: &Stage<'_>) -> Vec<Box<dyn Method>> {
-    SWEEP.map(|(lights, clamp)| Box::new(InstantRadiosity { lights, clamp }) as Box<dyn Method>).into()
+/// Scenes of more triangles than this get four times the lights and half the clamp: most of their lights lie where the
+/// camera does not look.
+const ROOM_TRIANGLES: usize = 10_000;
+
+fn sweep(stage: &Stage<'_>) -> Vec<Box<dyn Method>> {
+    let (more, closer) = if stage.trace.scene.triangles.len() > ROOM_TRIANGLES { (4, 0.5) } else { (1, 1.0) };
+    let setting = |(lights, clamp)| InstantRadiosity { lights: more * lights, clamp: closer * clamp };
+    SWEEP.map(|knobs| Box::new(setting(knobs)) as Box<dyn Method>).into()
 }
 
 /// The method at one setting.
