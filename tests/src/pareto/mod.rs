@@ -3,6 +3,9 @@
 pub mod row;
 pub mod scene;
 pub mod run;
+mod judge;
+
+pub use judge::file_name;
 
 use std::path::Path;
 

@@ -5,21 +5,18 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use glam::Vec3;
 use vlm_bake::scene::{LoadOptions, Scene, load};
 use vlm_bake::shade::TraceScene;
 use vlm_format::GltfFile;
 
+use super::judge::Judge;
 use super::row::Row;
 use super::scene;
-use crate::exact::ExactPixels;
-use crate::exr;
 use crate::method::{Cost, Method, MethodError, Picture, Prepared, Stage, View};
 use crate::methods::{ALL, Entry};
-use crate::metrics::{Comparison, Metrics, compare};
 use crate::proof::{Refusal, prove};
 use crate::random;
-use crate::truth::{Spp, Truth, TruthError, Truths};
+use crate::truth::{Spp, TruthError, Truths};
 
 /// What to run.
 #[derive(Clone, Debug)]
@@ -168,10 +165,10 @@ fn proven(
 }
 
 /// A method at a setting, ready for frames.
-struct Contestant {
-    method: Box<dyn Method>,
-    prepared: Box<dyn Prepared>,
-    cost: Cost,
+pub(super) struct Contestant {
+    pub(super) method: Box<dyn Method>,
+    pub(super) prepared: Box<dyn Prepared>,
+    pub(super) cost: Cost,
 }
 
 fn run_scene(
@@ -194,7 +191,7 @@ fn run_scene(
     let truths = Truths::new(&options.cache, &bytes)?;
     let mut rows = Vec::new();
     for (view, pictures) in views.iter().zip(&pictures) {
-        rows.extend(judge(options, name, &truths, view, &contestants, pictures, log)?);
+        rows.extend(Judge { options, scene: name, truths: &truths, view, log }.rows(&contestants, pictures)?);
     }
     Ok(rows)
 }
@@ -214,7 +211,8 @@ fn prepare(
     prepared.collect()
 }
 
-fn failed(scene: &str, method: &dyn Method, error: MethodError) -> RunError {
+/// A method's error with where it happened.
+pub(super) fn failed(scene: &str, method: &dyn Method, error: MethodError) -> RunError {
     RunError::Method { scene: scene.to_owned(), method: method.name(), knob: method.knob(), error }
 }
 
@@ -252,132 +250,6 @@ fn order_of(repeat: u32, views: usize, contestants: usize) -> Vec<(usize, usize)
     order
 }
 
-/// Measures all pictures of a view against its truth, and writes the last of each.
-fn judge(
-    options: &RunOptions,
-    name: &str,
-    truths: &Truths,
-    view: &View<'_>,
-    contestants: &[Contestant],
-    pictures: &[Vec<Picture>],
-    log: &dyn Fn(&str),
-) -> Result<Vec<Row>, RunError> {
-    let camera = &view.camera.name;
-    let hit = view.hit();
-    let width = view.gbuffer.width as usize;
-    let measure = |image: &[Vec3], truth: &Truth| {
-        compare(&Comparison { width, image, truth: &truth.irradiance, hit: &hit })
-    };
-    let error = |pictures: &Vec<Picture>, truth: &Truth| {
-        pictures
-            .last()
-            .and_then(|last| measure(&last.indirect, truth))
-            .map_or(f64::INFINITY, |m| m.relative_rmse)
-    };
-    let smallest = |truth: &Truth| pictures.iter().map(|p| error(p, truth)).fold(f64::INFINITY, f64::min);
-    let truth = truths.settle(view, options.spp, smallest)?;
-    log(&format!("{name}: {camera}: truth of {} directions, noise {:.4}", truth.spp, truth.noise));
-
-    let folder = options.out.join("images").join(file_name(name)).join(file_name(camera));
-    create_folder(&folder)?;
-    let size = (view.gbuffer.width, view.gbuffer.height);
-    exr::write(&folder.join("truth.exr"), size, &truth.irradiance)?;
-    let mut sums: Vec<ExactPixels> = Vec::new();
-    let mut rows = Vec::new();
-    for (contestant, pictures) in contestants.iter().zip(pictures) {
-        let algorithm = |picture: &Picture, sums: &mut Vec<ExactPixels>| {
-            algorithm_rmse(view, contestant, picture, sums).map_err(|e| failed(name, &*contestant.method, e))
-        };
-        for (repeat, picture) in pictures.iter().enumerate() {
-            let black = || RunError::BlackTruth { scene: name.to_owned(), camera: camera.clone() };
-            let metrics = measure(&picture.indirect, &truth).ok_or_else(black)?;
-            let neighbour = pictures.get(repeat.checked_sub(1).unwrap_or(1)).unwrap_or(picture);
-            rows.push(Row {
-                repeat: repeat as u32,
-                frame_change: change(&picture.indirect, &neighbour.indirect, &truth.irradiance),
-                algorithm_rmse: algorithm(picture, &mut sums)?,
-                truth_suffices: truth.suffices_for(metrics.relative_rmse),
-                ..row(name, view, contestant, picture, &metrics, &truth)
-            });
-        }
-        if let Some(last) = pictures.last() {
-            let method = &contestant.method;
-            let file = file_name(format!("{} {}", method.name(), method.knob()).trim());
-            exr::write(&folder.join(file + ".exr"), size, &last.indirect)?;
-        }
-    }
-    Ok(rows)
-}
-
-/// Where FLIP enters a row: 0 as long as [`Metrics`] has none.
-fn flip(_metrics: &Metrics) -> f64 {
-    0.0
-}
-
-fn row(
-    name: &str,
-    view: &View<'_>,
-    contestant: &Contestant,
-    picture: &Picture,
-    metrics: &Metrics,
-    truth: &Truth,
-) -> Row {
-    let Contestant { method, cost, .. } = contestant;
-    Row {
-        scene: name.to_owned(),
-        camera: view.camera.name.clone(),
-        width: view.gbuffer.width,
-        height: view.gbuffer.height,
-        method: method.name().to_owned(),
-        knob: method.knob(),
-        backend: method.backends().first().map_or("", |backend| backend.name()).to_owned(),
-        device: processor(),
-        lights: picture.lights,
-        pairs: picture.pairs,
-        rays: picture.rays,
-        bytes: cost.bytes,
-        seconds_prepare: cost.prepare_seconds,
-        seconds_inject: picture.seconds.inject,
-        seconds_gather: picture.seconds.gather,
-        relative_rmse: metrics.relative_rmse,
-        rel_mse: metrics.rel_mse,
-        flip: flip(metrics),
-        signed_energy: metrics.signed_energy,
-        p99: metrics.p99,
-        largest_jump: metrics.largest_jump,
-        truth_spp: truth.spp,
-        truth_noise: truth.noise,
-        ..Row::default()
-    }
-}
-
-/// Against the exact sum over the same lights, which is found once per set of lights.
-fn algorithm_rmse(
-    view: &View<'_>,
-    contestant: &Contestant,
-    picture: &Picture,
-    sums: &mut Vec<ExactPixels>,
-) -> Result<Option<f64>, MethodError> {
-    let Some(baked) = contestant.prepared.area_lights() else { return Ok(None) };
-    let known = sums.iter().position(|sum| std::sync::Arc::ptr_eq(&sum.baked, &baked));
-    let index = match known {
-        Some(index) => index,
-        None => {
-            sums.push(ExactPixels::new(view, &baked)?);
-            sums.len() - 1
-        }
-    };
-    Ok(sums[index].relative_rmse(&picture.indirect))
-}
-
-/// RMS of the change between two frames over the truth's RMS.
-fn change(a: &[Vec3], b: &[Vec3], truth: &[Vec3]) -> f64 {
-    let power = |v: Vec3| v.as_dvec3().length_squared();
-    let change: f64 = a.iter().zip(b).map(|(a, b)| power(*a - *b)).sum();
-    let all: f64 = truth.iter().map(|t| power(*t)).sum();
-    if all > 0.0 { (change / all).sqrt() } else { 0.0 }
-}
-
 fn write_rows(folder: &Path, rows: &[Row]) -> Result<(), RunError> {
     let path = folder.join("raw.csv");
     let mut writer = csv::Writer::from_path(&path)?;
@@ -387,28 +259,8 @@ fn write_rows(folder: &Path, rows: &[Row]) -> Result<(), RunError> {
     writer.flush().map_err(|source| RunError::Io { path, source })
 }
 
-fn create_folder(path: &Path) -> Result<(), RunError> {
+pub(super) fn create_folder(path: &Path) -> Result<(), RunError> {
     fs::create_dir_all(path).map_err(|source| RunError::Io { path: path.to_owned(), source })
-}
-
-/// A name that every file system takes: spaces become `_`, separators `-`.
-#[must_use]
-pub fn file_name(name: &str) -> String {
-    let safe = |c: char| match c {
-        ' ' => '_',
-        c if c.is_alphanumeric() || "._=-".contains(c) => c,
-        _ => '-',
-    };
-    name.chars().map(safe).collect()
-}
-
-/// The processor in its own words, where the system tells.
-fn processor() -> String {
-    let told = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
-        let line = text.lines().find(|line| line.starts_with("model name"))?;
-        Some(line.split_once(':')?.1.trim().to_owned())
-    });
-    told.unwrap_or_else(|| std::env::consts::ARCH.to_owned())
 }
 
 #[cfg(test)]
@@ -425,19 +277,5 @@ mod tests {
             assert_eq!(sorted.len(), 10);
         }
         assert!(orders[0] != orders[1] && orders[1] != orders[2]);
-    }
-
-    #[test]
-    fn change_is_relative_to_the_truth() {
-        let truth = vec![Vec3::splat(2.0); 4];
-        let brighter = vec![Vec3::splat(2.1); 4];
-        assert!((change(&brighter, &truth, &truth) - 0.05).abs() < 1e-6);
-        assert_eq!(change(&truth, &truth, &truth), 0.0);
-    }
-
-    #[test]
-    fn names_suit_every_file_system() {
-        assert_eq!(file_name("thesis lights=460 range=1.5"), "thesis_lights=460_range=1.5");
-        assert_eq!(file_name("../nave:1"), "..-nave-1");
     }
 }
