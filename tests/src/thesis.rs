@@ -99,6 +99,12 @@ impl ThesisGrid {
         Self { low, cell, cells, list, lists, overflow, build_seconds }
     }
 
+    /// What the lists take, bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        size_of_val(self.lists.as_slice()) as u64
+    }
+
     /// The lights of the cell that holds `p`; points outside use the nearest cell.
     pub fn lights_at(&self, p: Vec3) -> impl Iterator<Item = u32> + '_ {
         let position =

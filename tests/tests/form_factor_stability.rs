@@ -3,7 +3,6 @@
 use glam::{DVec3, Vec3};
 use vlm_shaders::cpu::form_factor::{
     ErrorBound, LightGeometry, Receivers, form_factor, form_factor_within, form_factors,
-    form_factors_portable,
 };
 use vlm_tests::form_factor::case::Case;
 use vlm_tests::form_factor::reference::truth;
@@ -100,7 +99,7 @@ fn cheap_forms_keep_their_bound() {
 }
 
 #[test]
-fn lanes_give_the_bits_of_the_scalar_form() {
+fn lanes_agree_with_the_scalar_form() {
     let triangles = sphere(1);
     let receivers: Vec<(Vec3, Vec3)> = (0..1003)
         .map(|i| {
@@ -111,17 +110,21 @@ fn lanes_give_the_bits_of_the_scalar_form() {
         })
         .collect();
     let soa = Receivers::new(receivers.iter().copied());
-    let (mut portable, mut fast) = (vec![0.0; soa.len()], vec![0.0; soa.len()]);
+    let mut lanes = vec![f32::NAN; soa.len()];
+    let mut worst = 0.0f32;
     for light in lights(&triangles) {
-        form_factors_portable(&light, &soa, &mut portable);
-        form_factors(&light, &soa, &mut fast);
+        form_factors(&light, &soa, &mut lanes);
         for (i, &(x, n)) in receivers.iter().enumerate() {
             let scalar = form_factor(&light, x, n);
-            assert_eq!(scalar.to_bits(), portable[i].to_bits(), "receiver {i}");
+            assert!((0.0..=1.0).contains(&lanes[i]), "receiver {i}");
             // Closer to the sphere, roundings of the receiver's place are worth more than that.
             if x.length() < 4.0 {
-                assert!((scalar - fast[i]).abs() < 4e-6, "receiver {i}: {scalar} {}", fast[i]);
+                worst = worst.max((scalar - lanes[i]).abs());
             }
         }
     }
+    assert!(worst < 1e-6, "{worst}");
+    let [a, b] = [&lights(&triangles)[0], &lights(&triangles)[1]];
+    form_factors(a, &soa, &mut lanes);
+    assert!(receivers.iter().zip(&lanes).any(|(&(x, n), f)| (form_factor(b, x, n) - f).abs() > 1e-3));
 }

@@ -14,7 +14,7 @@ use crate::scene::Scene;
 const MOST_CELLS: f64 = 256.0;
 
 /// Cells along the longest axis where the user names no size: about the size of a piece of furniture in a room, of a bay in a hall.
-const DEFAULT_CELLS: f64 = 24.0;
+pub const DEFAULT_CELLS: f64 = 24.0;
 
 /// A cubic lattice over a box.
 struct Lattice {

@@ -188,7 +188,11 @@ fn check_size(options: &RenderOptions) -> Result<(), RenderError> {
     if pixels == 0 || pixels > MOST_PIXELS { Err(RenderError::Size { width, height }) } else { Ok(()) }
 }
 
-fn gather_brute(
+/// Phases 1 and 2 with the exact form factor of every light at every pixel.
+///
+/// # Errors
+/// [`RenderError::UnknownNode`] if a VLM belongs to a node that the scene does not have.
+pub fn gather_brute(
     trace: &TraceScene<'_>,
     asset: &VlmAsset,
     gbuffer: &GBuffer,
@@ -199,7 +203,11 @@ fn gather_brute(
     Ok(lit.gather(gbuffer, progress, |receiver| gather(&lit.lights, &lit.radiosity, all.clone(), receiver)))
 }
 
-fn gather_by_grid(
+/// Phases 1 and 2 with the lights of each point's grid cell; every light without a grid or with few lights.
+///
+/// # Errors
+/// [`RenderError::UnknownNode`] if a VLM belongs to a node that the scene does not have.
+pub fn gather_by_grid(
     trace: &TraceScene<'_>,
     asset: &VlmAsset,
     gbuffer: &GBuffer,
@@ -266,7 +274,9 @@ impl<'a> LitScene<'a> {
         (gathered.iter().map(|g| g.irradiance).collect(), stats)
     }
 
-    fn receiver(&self, point: &SurfacePoint) -> Receiver {
+    /// A surface point as phase 2 sees it.
+    #[must_use]
+    pub fn receiver(&self, point: &SurfacePoint) -> Receiver {
         Receiver {
             position: point.position,
             normal: point.normal,
@@ -281,7 +291,11 @@ impl<'a> LitScene<'a> {
     }
 }
 
-fn world_lights(scene: &Scene, asset: &VlmAsset) -> Result<LightSet, RenderError> {
+/// The lights of an asset in world space.
+///
+/// # Errors
+/// [`RenderError::UnknownNode`] if a VLM belongs to a node that the scene does not have.
+pub fn world_lights(scene: &Scene, asset: &VlmAsset) -> Result<LightSet, RenderError> {
     let transform = |node: u32| scene.objects.iter().find(|o| o.node == node).map(|o| o.world_from_node);
     for vlm in &asset.vlms {
         transform(vlm.node).ok_or(RenderError::UnknownNode { id: vlm.id.clone(), node: vlm.node })?;

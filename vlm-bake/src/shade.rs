@@ -147,7 +147,10 @@ impl<'a> TraceScene<'a> {
         point.albedo * self.direct_irradiance(point.position, point.normal, point.geometric_normal)
     }
 
-    fn is_occluded(&self, origin: Vec3, direction: Vec3, max_distance: f32) -> bool {
+    /// True if an opaque surface, whichever side it shows, lies on the ray nearer than `max_distance` (in multiples of
+    /// `direction`).
+    #[must_use]
+    pub fn is_occluded(&self, origin: Vec3, direction: Vec3, max_distance: f32) -> bool {
         self.bvh.occluded_where(origin, direction, max_distance, |hit| self.is_opaque(hit))
     }
 

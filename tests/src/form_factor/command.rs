@@ -89,6 +89,17 @@ pub fn on_cpu(cases: &[Case]) -> Vec<f32> {
     cases.iter().map(|case| form_factor(&case.light(), case.x, case.n)).collect()
 }
 
+/// The kernel's lanes; each case has a light of its own, so most of them idle.
+#[must_use]
+pub fn on_lanes(cases: &[Case]) -> Vec<f32> {
+    let mut result = [0.0];
+    let one = |case: &Case| {
+        form_factors(&case.light(), &Receivers::new([(case.x, case.n)]), &mut result);
+        result[0]
+    };
+    cases.iter().map(one).collect()
+}
+
 fn run_stress(count: u64, backend: Backend) -> Result<(), Box<dyn Error>> {
     let report = match backend {
         Backend::Cpu => stress::run(count, on_cpu),

@@ -59,7 +59,7 @@ pub enum Reach {
 pub struct BinErrors {
     /// `|F - truth| / U`.
     pub of_uncosined: Errors,
-    /// The same less what rounding the receiver's place to f32 explains; see [`rounding_floor`].
+    /// The same less what rounding the receiver's place to f32 explains; which is how far the truth moves with that rounding.
     pub beyond_floor: Errors,
     /// `|F - truth| / truth` where both cosines exceed 0.1 and the whole light is seen.
     pub relative: Errors,

@@ -1,6 +1,9 @@
 //! Run time against error: every method over its knob, on the same machine in one interleaved run.
 
 pub mod row;
+pub mod scene;
+pub mod run;
+mod judge;
 pub mod names;
 pub mod front;
 pub mod curves;

@@ -2,6 +2,7 @@
 
 mod render;
 mod report;
+mod pareto;
 
 use std::process::ExitCode;
 
@@ -21,6 +22,8 @@ enum Command {
     Render(render::RenderArgs),
     /// Write the summary and the figures of a Pareto run anew
     Report(report::ReportArgs),
+    /// Run every method over its knobs: time against error
+    Pareto(pareto::ParetoArgs),
     /// Form factors of a file of cases, or the stress test
     FormFactor(command::FormFactorArgs),
     /// Measure the form factor's throughput on one core
@@ -29,16 +32,17 @@ enum Command {
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        Command::Render(args) => render::run(&args),
-        Command::Report(args) => report::run(&args),
-        Command::FormFactor(args) => command::run(&args),
+        Command::Render(args) => render::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Pareto(args) => pareto::command(&args),
+        Command::Report(args) => report::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::FormFactor(args) => command::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Kernel(args) => {
             command::run_kernel(&args);
-            Ok(())
+            Ok(ExitCode::SUCCESS)
         }
     };
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(error) => {
             eprintln!("error: {error}");
             ExitCode::from(2)

@@ -85,7 +85,8 @@ struct BenchReport {
     metrics: Option<Metrics>,
 }
 
-fn size(text: &str) -> Result<(u32, u32), String> {
+/// Parses `WIDTHxHEIGHT`.
+pub fn size(text: &str) -> Result<(u32, u32), String> {
     let numbers = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
     numbers
         .filter(|&(w, h)| w > 0 && h > 0)
