@@ -1,17 +1,15 @@
-//! `vlm-bench form-factor` and `vlm-bench kernel`.
+//! `vlm-bench form-factor`.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use glam::Vec3;
-use vlm_shaders::cpu::form_factor::{LightGeometry, Receivers, form_factor, form_factors};
+use vlm_shaders::cpu::form_factor::{Receivers, form_factor, form_factors};
 
 use super::case::Case;
+use super::error_plot::plot;
 use super::gpu::GpuFormFactor;
 use super::stress;
-use super::textbook::{EdgeForm, textbook};
 
 /// Which mirror runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -38,14 +36,9 @@ pub struct FormFactorArgs {
     /// Runs this many generated cases, 1e7 unless told, and prints the errors by bin.
     #[arg(long, num_args = 0..=1, default_missing_value = "10000000", required_unless_present = "cases")]
     pub stress: Option<u64>,
-}
-
-/// Throughput of the form factor on one core.
-#[derive(Args, Clone, Debug)]
-pub struct KernelArgs {
-    /// Interleaved repeats, of which the median counts.
-    #[arg(long, default_value_t = 15)]
-    pub repeats: usize,
+    /// Also draws error against distance for this and the textbook forms, on CPU and GPU, as FILE.svg and FILE.png.
+    #[arg(long, value_name = "FILE", requires = "stress")]
+    pub plot: Option<PathBuf>,
 }
 
 /// Runs `vlm-bench form-factor`.
@@ -55,7 +48,11 @@ pub struct KernelArgs {
 pub fn run(args: &FormFactorArgs) -> Result<(), Box<dyn Error>> {
     match (&args.cases, &args.out) {
         (Some(cases), Some(out)) => evaluate_file(cases, out, args.backend),
-        _ => run_stress(args.stress.unwrap_or(10_000_000), args.backend),
+        _ => {
+            let count = args.stress.unwrap_or(10_000_000);
+            run_stress(count, args.backend)?;
+            args.plot.as_deref().map_or(Ok(()), |path| plot(count, path))
+        }
     }
 }
 
@@ -114,75 +111,5 @@ fn run_stress(count: u64, backend: Backend) -> Result<(), Box<dyn Error>> {
     match report.first_out_of_range {
         Some(case) => Err(format!("results out of range, the first in case {case}").into()),
         None => Ok(()),
-    }
-}
-
-/// Runs `vlm-bench kernel`: millions of pairs per second of each form in the same, interleaved run.
-pub fn run_kernel(args: &KernelArgs) {
-    let scene = Scene::new();
-    let mut out = vec![0.0; scene.points.len()];
-    let mut sink = 0.0f32;
-    let mut seconds: [Vec<f64>; 3] = Default::default();
-    for _ in 0..args.repeats.max(1) {
-        let start = Instant::now();
-        for light in &scene.lights {
-            form_factors(light, &scene.receivers, &mut out);
-            sink += out[0];
-        }
-        seconds[0].push(start.elapsed().as_secs_f64());
-        let start = Instant::now();
-        sink += scene.pairs().map(|(i, x, n)| form_factor(&scene.lights[i], x, n)).sum::<f32>();
-        seconds[1].push(start.elapsed().as_secs_f64());
-        let start = Instant::now();
-        sink += scene
-            .pairs()
-            .map(|(i, x, n)| textbook(EdgeForm::Acos, &Case { corners: scene.triangles[i], x, n }))
-            .sum::<f32>();
-        seconds[2].push(start.elapsed().as_secs_f64());
-    }
-    let pairs = (scene.lights.len() * scene.points.len()) as f64;
-    let rates = seconds.map(|mut s| {
-        s.sort_by(f64::total_cmp);
-        pairs / s[s.len() / 2] / 1e6
-    });
-    println!("| form | M pairs/s, one core | over the textbook's |\n|---|---|---|");
-    for (name, rate) in ["lanes", "scalar", "textbook acos, scalar"].iter().zip(rates) {
-        println!("| {name} | {rate:.1} | {:.1} |", rate / rates[2]);
-    }
-    std::hint::black_box(sink);
-}
-
-/// Lights and receivers all over a box: a quarter of the pairs lit, of those one in six close or across the horizon.
-struct Scene {
-    triangles: Vec<[Vec3; 3]>,
-    lights: Vec<LightGeometry>,
-    points: Vec<(Vec3, Vec3)>,
-    receivers: Receivers,
-}
-
-impl Scene {
-    fn new() -> Self {
-        let mut state = 1u64;
-        let mut unit = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 40) as f32 / (1u32 << 24) as f32
-        };
-        let mut point = || Vec3::new(unit(), unit(), unit());
-        let points: Vec<_> =
-            (0..4096).map(|_| (point() * 10.0, (point() - 0.5).normalize_or_zero())).collect();
-        let triangles: Vec<_> = (0..64)
-            .map(|_| {
-                let (centre, size) = (point() * 10.0, 0.1 * 20f32.powf(point().x));
-                [point(), point(), point()].map(|corner| centre + (corner - 0.5) * size)
-            })
-            .collect();
-        let lights = triangles.iter().map(|t| LightGeometry::new(t.map(|v| v.as_dvec3()))).collect();
-        let receivers = Receivers::new(points.iter().copied());
-        Self { triangles, lights, points, receivers }
-    }
-
-    /// Every light with every receiver.
-    fn pairs(&self) -> impl Iterator<Item = (usize, Vec3, Vec3)> + '_ {
-        (0..self.lights.len()).flat_map(|i| self.points.iter().map(move |&(x, n)| (i, x, n)))
     }
 }

@@ -1,5 +1,7 @@
 //! The form factor on a GPU: the WGSL shell over the same cases.
 
+use std::time::Instant;
+
 use bytemuck::{Pod, Zeroable};
 use vlm_shaders::cpu::form_factor::{ErrorBound, LightGeometry};
 use vlm_shaders::wgsl;
@@ -31,10 +33,20 @@ struct Receiver {
     padding: [f32; 2],
 }
 
+/// Buffers of one dispatch.
+struct Task {
+    group: wgpu::BindGroup,
+    results: wgpu::Buffer,
+    back: wgpu::Buffer,
+    cases: u32,
+}
+
 /// A device with the shader compiled.
 pub struct GpuFormFactor {
     /// The adapter, in its driver's words.
     pub name: String,
+    /// It runs on the processor.
+    pub is_software: bool,
     device: wgpu::Device,
     queue: wgpu::Queue,
     pipeline: wgpu::ComputePipeline,
@@ -77,7 +89,9 @@ impl GpuFormFactor {
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             cache: None,
         });
-        Ok(Self { name: adapter.get_info().name, device, queue, pipeline })
+        let info = adapter.get_info();
+        let is_software = info.device_type == wgpu::DeviceType::Cpu;
+        Ok(Self { name: info.name, is_software, device, queue, pipeline })
     }
 
     /// One exact form factor per case.
@@ -109,6 +123,28 @@ impl GpuFormFactor {
         if cases.is_empty() {
             return Ok(Vec::new());
         }
+        let task = self.upload(cases, bound);
+        self.submit(&task, 1);
+        self.read(&task.back)
+    }
+
+    /// Exact form factors per second over cases that lie in the device's memory, from submission to completion.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn pairs_per_second(&self, cases: &[Case]) -> Result<f64, GpuError> {
+        const ROUNDS: u32 = 4;
+        let task = self.upload(cases, &ErrorBound::default());
+        // The first run compiles.
+        self.submit(&task, 1);
+        self.wait()?;
+        let start = Instant::now();
+        self.submit(&task, ROUNDS);
+        self.wait()?;
+        Ok(f64::from(ROUNDS) * cases.len() as f64 / start.elapsed().as_secs_f64())
+    }
+
+    fn upload(&self, cases: &[Case], bound: &ErrorBound) -> Task {
         let lights: Vec<LightGeometry> = cases.iter().map(Case::light).collect();
         let receivers: Vec<Receiver> = cases
             .iter()
@@ -131,16 +167,24 @@ impl GpuFormFactor {
             layout: &self.pipeline.get_bind_group_layout(0),
             entries: &entries,
         });
+        Task { group, results, back, cases: cases.len() as u32 }
+    }
+
+    fn submit(&self, task: &Task, rounds: u32) {
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        {
+        for _ in 0..rounds {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
             pass.set_pipeline(&self.pipeline);
-            pass.set_bind_group(0, &group, &[]);
-            pass.dispatch_workgroups((cases.len() as u32).div_ceil(WORKGROUP), 1, 1);
+            pass.set_bind_group(0, &task.group, &[]);
+            pass.dispatch_workgroups(task.cases.div_ceil(WORKGROUP), 1, 1);
         }
-        encoder.copy_buffer_to_buffer(&results, 0, &back, 0, size);
+        encoder.copy_buffer_to_buffer(&task.results, 0, &task.back, 0, task.back.size());
         self.queue.submit([encoder.finish()]);
-        self.read(&back)
+    }
+
+    fn wait(&self) -> Result<(), GpuError> {
+        let wait = wgpu::PollType::Wait { submission_index: None, timeout: None };
+        self.device.poll(wait).map(|_| ()).map_err(|error| GpuError::Device(error.to_string()))
     }
 
     fn input(&self, label: &str, contents: &[u8]) -> wgpu::Buffer {
@@ -161,9 +205,7 @@ impl GpuFormFactor {
     fn read(&self, buffer: &wgpu::Buffer) -> Result<Vec<f32>, GpuError> {
         let failed = |error: &dyn std::fmt::Display| GpuError::Device(error.to_string());
         buffer.map_async(wgpu::MapMode::Read, .., |_| {});
-        self.device
-            .poll(wgpu::PollType::Wait { submission_index: None, timeout: None })
-            .map_err(|error| failed(&error))?;
+        self.wait()?;
         let mapped = buffer.get_mapped_range(..).map_err(|error| failed(&error))?;
         Ok(bytemuck::cast_slice(&mapped).to_vec())
     }

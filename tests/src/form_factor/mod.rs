@@ -7,4 +7,7 @@ pub mod textbook;
 pub mod bins;
 pub mod stress;
 pub mod gpu;
+pub mod error_plot;
+pub mod peak;
+pub mod kernel;
 pub mod command;

@@ -7,7 +7,7 @@ mod pareto;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use vlm_tests::form_factor::command;
+use vlm_tests::form_factor::{command, kernel};
 
 #[derive(Parser)]
 #[command(name = "vlm-bench", version, about = "Measures Virtual Light Meshes against other methods")]
@@ -27,7 +27,7 @@ enum Command {
     /// Form factors of a file of cases, or the stress test
     FormFactor(command::FormFactorArgs),
     /// Measure the form factor's throughput on one core
-    Kernel(command::KernelArgs),
+    Kernel(kernel::KernelArgs),
 }
 
 fn main() -> ExitCode {
@@ -36,10 +36,7 @@ fn main() -> ExitCode {
         Command::Pareto(args) => pareto::command(&args),
         Command::Report(args) => report::run(&args).map(|()| ExitCode::SUCCESS),
         Command::FormFactor(args) => command::run(&args).map(|()| ExitCode::SUCCESS),
-        Command::Kernel(args) => {
-            command::run_kernel(&args);
-            Ok(ExitCode::SUCCESS)
-        }
+        Command::Kernel(args) => kernel::run(&args).map(|()| ExitCode::SUCCESS),
     };
     match result {
         Ok(code) => code,
