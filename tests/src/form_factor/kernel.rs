@@ -45,7 +45,7 @@ pub fn run(args: &KernelArgs) -> Result<(), Box<dyn Error>> {
     println!(
         "{operations} operations a pair by the far form; this core's measured limit: {peak:.0} G operations/s\n"
     );
-    for workload in [Workload::room()?, Workload::anywhere()] {
+    for workload in [Workload::anywhere(), Workload::room()?, Workload::lit()] {
         println!("{}\n", workload.describe());
         println!("| form | M pairs/s, one core | quartiles | over scalar acos | share of the limit |");
         println!("|---|---|---|---|---|");
@@ -74,7 +74,7 @@ impl Workload {
     fn room() -> Result<Self, Box<dyn Error>> {
         let file = GltfFile::from_slice(&cornell::cornell(), "cornell.glb", None)?;
         let scene = load(&file, &LoadOptions::default())?;
-        let asset = bake(&scene, &BakeOptions::preset(Preset::Draft, scene.triangles.len()), &Silent)?.asset;
+        let asset = bake(&scene, &BakeOptions::preset(Preset::Game, scene.triangles.len()), &Silent)?.asset;
         let world = |node: u32| scene.objects.iter().find(|o| o.node == node).map(|o| o.world_from_node);
         let lights = LightSet::new(&asset, |node| world(node).unwrap_or_default()).geometry;
         let trace = TraceScene::new(&scene);
@@ -98,6 +98,21 @@ impl Workload {
             LightGeometry::new(corners.map(|v| v.as_dvec3()))
         };
         Self::new("lights and points anywhere in a box", (0..64).map(|_| light()).collect(), points)
+    }
+
+    /// Lights and receivers that all face each other across a distance.
+    fn lit() -> Self {
+        let Self { mut lights, points, .. } = Self::anywhere();
+        let up = points
+            .iter()
+            .map(|&(x, n)| (x - Vec3::Z * 30.0, Vec3::new(0.3 * n.x, 0.3 * n.y, 1.0).normalize_or_zero()));
+        let points = up.collect();
+        for light in &mut lights {
+            if light.normal.z > 0.0 {
+                *light = LightGeometry::new([light.v0, light.v2, light.v1].map(|v| v.as_dvec3()));
+            }
+        }
+        Self::new("lights and points that face each other across a room", lights, points)
     }
 
     fn pairs(&self) -> impl Iterator<Item = (&LightGeometry, Vec3, Vec3)> + '_ {

@@ -120,16 +120,22 @@ impl WithSimd for Batch<'_> {
     fn with_simd<S: Simd>(self, simd: S) {
         let count = self.receivers.len.min(self.results.len());
         let tiles = self.receivers.blocks.chunks(TILE / LANES);
+        let mut waiting = [Waiting::NONE; CLASSES];
         for (blocks, results) in tiles.zip(self.results[..count].chunks_mut(TILE)) {
-            tile(simd, self.light, blocks, results);
+            tile(simd, self.light, blocks, results, &mut waiting);
         }
     }
 }
 
-/// Receivers per round of far lanes and close ones: what the lists of close ones hold.
-const TILE: usize = 1024;
+/// Receivers per round of far lanes and close ones: what the lists of close ones hold. Fewer leave registers half empty.
+const TILE: usize = 4096;
+
+/// Kinds of close receivers, which take forms of different length: the light is whole, or one or two of its corners are
+/// above the horizon.
+const CLASSES: usize = 3;
 
 /// Receivers of a tile that wait for one of the slower forms.
+#[derive(Clone, Copy)]
 struct Waiting {
     lanes: [u16; TILE],
     count: usize,
@@ -137,43 +143,48 @@ struct Waiting {
 
 impl Waiting {
     const NONE: Self = Self { lanes: [0; TILE], count: 0 };
-
-    /// Branch-free: the slot is overwritten unless the lane waits.
-    #[inline(always)]
-    fn push(&mut self, lane: usize, waits: bool) {
-        self.lanes[self.count] = lane as u16;
-        self.count += usize::from(waits);
-    }
-}
-
-/// What [`far_block`] leaves to the slower forms.
-#[derive(Clone, Copy, Default)]
-struct Close {
-    whole: [f32; LANES],
-    one_above: [f32; LANES],
-    two_above: [f32; LANES],
 }
 
 #[inline(always)]
-fn tile<S: Simd>(simd: S, light: &LightGeometry, blocks: &[Block], results: &mut [f32]) {
-    let (mut whole, mut one_above, mut two_above) = (Waiting::NONE, Waiting::NONE, Waiting::NONE);
+fn tile<S: Simd>(
+    simd: S,
+    light: &LightGeometry,
+    blocks: &[Block],
+    results: &mut [f32],
+    waiting: &mut [Waiting; CLASSES],
+) {
+    for list in waiting.iter_mut() {
+        list.count = 0;
+    }
     for (b, (block, results)) in blocks.iter().zip(results.chunks_mut(LANES)).enumerate() {
-        let mut far = [0.0; LANES];
-        let mut close = Close::default();
-        if far_block(simd, light, block, &mut far, &mut close) {
-            for lane in 0..results.len() {
-                let i = b * LANES + lane;
-                whole.push(i, close.whole[lane] > 0.0);
-                one_above.push(i, close.one_above[lane] > 0.0);
-                two_above.push(i, close.two_above[lane] > 0.0);
+        let (mut far, mut class) = ([0.0; LANES], [0.0; LANES]);
+        if far_block(simd, light, block, &mut far, &mut class) {
+            let mut left = bits(&class) & ((1 << results.len()) - 1);
+            while left != 0 {
+                let lane = left.trailing_zeros() as usize;
+                left &= left - 1;
+                let list = &mut waiting[class[lane] as usize - 1];
+                list.lanes[list.count] = (b * LANES + lane) as u16;
+                list.count += 1;
             }
         }
         results.copy_from_slice(&far[..results.len()]);
     }
-    finish::<S, true>(simd, light, &whole, blocks, results);
+    let [whole, one_above, two_above] = waiting;
+    finish::<S, true>(simd, light, whole, blocks, results);
     // Apart, as the second triangle of a quad is not evaluated for a register of triangles.
-    finish::<S, false>(simd, light, &one_above, blocks, results);
-    finish::<S, false>(simd, light, &two_above, blocks, results);
+    finish::<S, false>(simd, light, one_above, blocks, results);
+    finish::<S, false>(simd, light, two_above, blocks, results);
+}
+
+/// A bit per lane that is above 0.
+#[inline(always)]
+fn bits(class: &[f32; LANES]) -> u32 {
+    let mut bits = 0;
+    for (lane, class) in class.iter().enumerate() {
+        bits |= u32::from(*class > 0.0) << lane;
+    }
+    bits
 }
 
 /// Evaluates the receivers that wait, a register at a time: lights wholly above the horizon, or cut by it.
@@ -203,30 +214,34 @@ fn finish<S: Simd, const IS_WHOLE: bool>(
     }
 }
 
-/// The far form of every lane, 0 where there is no light, and which lanes need another form; true if any does.
+/// The far form of every lane into `far`, which holds zeros, 0 where there is no light, and the class from 1 of the lanes that need another form; true
+/// if any does.
 #[inline(always)]
 fn far_block<S: Simd>(
     simd: S,
     light: &LightGeometry,
     block: &Block,
     far: &mut [f32; LANES],
-    close: &mut Close,
+    class: &mut [f32; LANES],
 ) -> bool {
     let mut any = false;
     for register in 0..registers::<S>() {
         let (x, n) = block.load(simd, register);
         let seen = Seen::new(light, x, n);
+        let zero = seen.normal_r.zero();
+        // Neighbouring receivers face the same way.
+        if !zero.any(seen.is_lit) {
+            continue;
+        }
         let (result, is_far) = seen.far(light, n);
-        let zero = result.zero();
         let above = seen.heights.all_above();
         store(far, register, Real::select(seen.is_lit & above & is_far, result, zero));
         let is_close: LaneMask<S> = seen.is_lit & !(above & is_far);
         if zero.any(is_close) {
             any = true;
-            let two = seen.heights.two_above();
-            store(&mut close.whole, register, flag(zero, is_close & above));
-            store(&mut close.one_above, register, flag(zero, is_close & !two & !above));
-            store(&mut close.two_above, register, flag(zero, is_close & two));
+            let cut = Real::select(seen.heights.two_above(), zero.splat(3.0), zero.splat(2.0));
+            let kind = Real::select(above, zero.one(), cut);
+            store(class, register, Real::select(is_close, kind, zero));
         }
     }
     any
@@ -250,10 +265,4 @@ fn load<S: Simd>(simd: S, [x, y, z]: &[[f32; LANES]; 3], register: usize) -> Vec
 #[inline(always)]
 fn store<S: Simd>(values: &mut [f32; LANES], register: usize, lanes: Lanes<S>) {
     S::as_mut_simd_f32s(values).0[register] = lanes.values;
-}
-
-/// 1 where the mask is set.
-#[inline(always)]
-fn flag<R: Real>(kind: R, mask: R::Mask) -> R {
-    R::select(mask, kind.one(), kind.zero())
 }
