@@ -1,12 +1,13 @@
 //! Pictures on the CPU: direct light, and indirect light by path tracing or by virtual lights.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use glam::{DMat4, Vec3};
 use rayon::prelude::*;
 use serde::Serialize;
 use vlm_format::VlmAsset;
-use vlm_shaders::cpu::gather::{Gathered, Receiver, gather};
+use vlm_shaders::cpu::gather::{Gathered, Receiver, gather_together};
 use vlm_shaders::cpu::grid::lights_at;
 use vlm_shaders::cpu::inject::inject;
 use vlm_shaders::cpu::upload::LightSet;
@@ -19,6 +20,9 @@ use crate::shade::{SurfacePoint, TraceScene};
 
 /// Below this many lights, looking up a cell's list costs more than the lights that it leaves out.
 const FEWEST_LIGHTS_FOR_GRID: usize = 40;
+
+/// Pixels that are gathered as one task. More of them share a list, fewer spread better over threads.
+const PIXELS_TOGETHER: usize = 4096;
 
 /// The largest picture, pixels: one that fits in memory with room to spare.
 const MOST_PIXELS: u64 = 1 << 28;
@@ -199,8 +203,8 @@ pub fn gather_brute(
     progress: &dyn Progress,
 ) -> Result<(Vec<Vec3>, RenderStats), RenderError> {
     let lit = LitScene::new(trace, asset)?;
-    let all = 0..lit.lights.len() as u32;
-    Ok(lit.gather(gbuffer, progress, |receiver| gather(&lit.lights, &lit.radiosity, all.clone(), receiver)))
+    let all: Vec<u32> = (0..lit.lights.len() as u32).collect();
+    Ok(lit.gather_lists(gbuffer, progress, |_| &all))
 }
 
 /// Phases 1 and 2 with the lights of each point's grid cell; every light without a grid or with few lights.
@@ -217,10 +221,7 @@ pub fn gather_by_grid(
         return gather_brute(trace, asset, gbuffer, progress);
     };
     let lit = LitScene::new(trace, asset)?;
-    Ok(lit.gather(gbuffer, progress, |receiver| {
-        let list = lights_at(grid, receiver.position).iter().copied();
-        gather(&lit.lights, &lit.radiosity, list, receiver)
-    }))
+    Ok(lit.gather_lists(gbuffer, progress, |position| lights_at(grid, position)))
 }
 
 /// The virtual lights of an asset after phase 1: what every gathering method starts from.
@@ -272,6 +273,53 @@ impl<'a> LitScene<'a> {
         let pairs_evaluated = gathered.iter().map(|g| g.pairs).sum();
         let stats = RenderStats { seconds, pairs_evaluated, lights: self.lights.len() as u32 };
         (gathered.iter().map(|g| g.irradiance).collect(), stats)
+    }
+
+    /// Phase 2 at every pixel with the list of lights that its position has: pixels of a list together.
+    pub fn gather_lists<'l>(
+        &self,
+        gbuffer: &GBuffer,
+        progress: &dyn Progress,
+        list_at: impl Fn(Vec3) -> &'l [u32] + Sync,
+    ) -> (Vec<Vec3>, RenderStats) {
+        let start = Instant::now();
+        let tiles = gbuffer.points.par_chunks(PIXELS_TOGETHER);
+        progress.begin("gather", tiles.len() as u64);
+        let gathered: Vec<Gathered> = tiles
+            .flat_map_iter(|points| {
+                progress.advance(1);
+                self.gather_tile(points, &list_at)
+            })
+            .collect();
+        let seconds = PhaseSeconds { inject: self.inject_seconds, gather: start.elapsed().as_secs_f64() };
+        let pairs_evaluated = gathered.iter().map(|g| g.pairs).sum();
+        let stats = RenderStats { seconds, pairs_evaluated, lights: self.lights.len() as u32 };
+        (gathered.iter().map(|g| g.irradiance).collect(), stats)
+    }
+
+    fn gather_tile<'l>(
+        &self,
+        points: &[Option<SurfacePoint>],
+        list_at: impl Fn(Vec3) -> &'l [u32],
+    ) -> Vec<Gathered> {
+        let mut lists: BTreeMap<(*const u32, usize), (&[u32], Vec<usize>)> = BTreeMap::new();
+        for (pixel, point) in points.iter().enumerate() {
+            if let Some(point) = point {
+                let list = list_at(point.position);
+                let entry = lists.entry((list.as_ptr(), list.len())).or_insert_with(|| (list, Vec::new()));
+                entry.1.push(pixel);
+            }
+        }
+        let mut gathered = vec![Gathered::default(); points.len()];
+        for (list, pixels) in lists.values() {
+            let receivers: Vec<Receiver> =
+                pixels.iter().filter_map(|&pixel| Some(self.receiver(points[pixel].as_ref()?))).collect();
+            let together = gather_together(&self.lights, &self.radiosity, list, &receivers);
+            for (&pixel, result) in pixels.iter().zip(together) {
+                gathered[pixel] = result;
+            }
+        }
+        gathered
     }
 
     /// A surface point as phase 2 sees it.

@@ -8,9 +8,10 @@
 use glam::Vec3;
 use pulp::{Arch, Simd, WithSimd};
 
+use super::clip::Heights;
 use super::light::LightGeometry;
 use super::real::{LaneMask, Lanes, Real, Vector};
-use super::{Seen, close_clipped, close_whole, form_factor};
+use super::{Seen, close_clipped, close_whole, form_factor, is_behind};
 
 /// Receivers per block: one AVX-512 register, or two of AVX.
 pub const LANES: usize = 16;
@@ -19,6 +20,8 @@ pub const LANES: usize = 16;
 #[derive(Clone, Debug, Default)]
 pub struct Receivers {
     blocks: Vec<Block>,
+    /// Normals of the surfaces themselves, where they differ from the receivers'; empty, or one per block.
+    surfaces: Vec<[[f32; LANES]; 3]>,
     len: usize,
 }
 
@@ -46,10 +49,8 @@ impl Block {
 
     #[inline(always)]
     fn set(&mut self, lane: usize, x: Vec3, n: Vec3) {
-        for axis in 0..3 {
-            self.x[axis][lane] = x[axis];
-            self.n[axis][lane] = n[axis];
-        }
+        set(&mut self.x, lane, x);
+        set(&mut self.n, lane, n);
     }
 }
 
@@ -67,6 +68,28 @@ impl Receivers {
                 block.set(lane, x, n);
             }
             all.len += 1;
+        }
+        all
+    }
+
+    /// Points, their shading normals, and the normals of the surfaces themselves: a light wholly behind the surface gives
+    /// nothing.
+    #[must_use]
+    pub fn on_surfaces(receivers: impl IntoIterator<Item = (Vec3, Vec3, Vec3)>) -> Self {
+        let mut surfaces = Vec::new();
+        let mut bent = false;
+        let mut all = Self::new(receivers.into_iter().enumerate().map(|(i, (x, n, surface))| {
+            if i % LANES == 0 {
+                surfaces.push([[0.0; LANES]; 3]);
+            }
+            if let Some(block) = surfaces.last_mut() {
+                set(block, i % LANES, surface);
+            }
+            bent |= n != surface;
+            (x, n)
+        }));
+        if bent {
+            all.surfaces = surfaces;
         }
         all
     }
@@ -108,7 +131,11 @@ impl Batch<'_> {
     fn one_by_one(self) {
         for (i, result) in self.results.iter_mut().take(self.receivers.len).enumerate() {
             let (x, n) = self.receivers.blocks[i / LANES].get(i % LANES);
-            *result = form_factor(self.light, x, n);
+            let surface = self.receivers.surfaces.get(i / LANES).map_or(n, |block| {
+                let lane = i % LANES;
+                Vec3::new(block[0][lane], block[1][lane], block[2][lane])
+            });
+            *result = if is_behind(self.light, x, surface) { 0.0 } else { form_factor(self.light, x, n) };
         }
     }
 }
@@ -121,8 +148,9 @@ impl WithSimd for Batch<'_> {
         let count = self.receivers.len.min(self.results.len());
         let tiles = self.receivers.blocks.chunks(TILE / LANES);
         let mut waiting = [Waiting::NONE; CLASSES];
-        for (blocks, results) in tiles.zip(self.results[..count].chunks_mut(TILE)) {
-            tile(simd, self.light, blocks, results, &mut waiting);
+        for (i, (blocks, results)) in tiles.zip(self.results[..count].chunks_mut(TILE)).enumerate() {
+            let surfaces = self.receivers.surfaces.get(i * (TILE / LANES)..).unwrap_or(&[]);
+            tile(simd, self.light, blocks, surfaces, results, &mut waiting);
         }
     }
 }
@@ -150,6 +178,7 @@ fn tile<S: Simd>(
     simd: S,
     light: &LightGeometry,
     blocks: &[Block],
+    surfaces: &[[[f32; LANES]; 3]],
     results: &mut [f32],
     waiting: &mut [Waiting; CLASSES],
 ) {
@@ -158,7 +187,7 @@ fn tile<S: Simd>(
     }
     for (b, (block, results)) in blocks.iter().zip(results.chunks_mut(LANES)).enumerate() {
         let (mut far, mut class) = ([0.0; LANES], [0.0; LANES]);
-        if far_block(simd, light, block, &mut far, &mut class) {
+        if far_block(simd, light, block, surfaces.get(b), &mut far, &mut class) {
             let mut left = bits(&class) & ((1 << results.len()) - 1);
             while left != 0 {
                 let lane = left.trailing_zeros() as usize;
@@ -221,13 +250,18 @@ fn far_block<S: Simd>(
     simd: S,
     light: &LightGeometry,
     block: &Block,
+    surface: Option<&[[f32; LANES]; 3]>,
     far: &mut [f32; LANES],
     class: &mut [f32; LANES],
 ) -> bool {
     let mut any = false;
     for register in 0..registers::<S>() {
         let (x, n) = block.load(simd, register);
-        let seen = Seen::new(light, x, n);
+        let mut seen = Seen::new(light, x, n);
+        if let Some(surface) = surface {
+            let heights = Heights::new(light, seen.r, load(simd, surface, register));
+            seen.is_lit = seen.is_lit & heights.any_above();
+        }
         let zero = seen.normal_r.zero();
         // Neighbouring receivers face the same way.
         if !zero.any(seen.is_lit) {
@@ -245,6 +279,13 @@ fn far_block<S: Simd>(
         }
     }
     any
+}
+
+#[inline(always)]
+fn set(block: &mut [[f32; LANES]; 3], lane: usize, v: Vec3) {
+    for axis in 0..3 {
+        block[axis][lane] = v[axis];
+    }
 }
 
 /// Registers per block.

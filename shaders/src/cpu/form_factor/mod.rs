@@ -48,6 +48,13 @@ pub fn form_factor(light: &LightGeometry, x: Vec3, n: Vec3) -> f32 {
     }
 }
 
+/// True if the whole light lies behind a surface through `x` with this normal.
+#[must_use]
+pub fn is_behind(light: &LightGeometry, x: Vec3, surface_normal: Vec3) -> bool {
+    let r = Vector::from((light.v0 - x) * light.scale);
+    !Heights::new(light, r, Vector::from(surface_normal)).any_above()
+}
+
 /// A light as seen from a point.
 struct Seen<R: Real> {
     /// First corner, light units.
