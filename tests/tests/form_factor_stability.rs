@@ -2,8 +2,10 @@
 
 use glam::{DVec3, Vec3};
 use vlm_shaders::cpu::form_factor::{
-    ErrorBound, LightGeometry, Receivers, form_factor, form_factor_within, form_factors,
+    ErrorBound, LightGeometry, Receivers, centroid_form_factor, form_factor, form_factor_within, form_factors,
 };
+use vlm_shaders::cpu::gather::{Receiver, gather_together};
+use vlm_shaders::cpu::upload::LightSet;
 use vlm_tests::form_factor::case::Case;
 use vlm_tests::form_factor::reference::truth;
 
@@ -73,6 +75,81 @@ fn a_step_of_a_millionth_does_not_make_the_sum_jump() {
             assert!(largest.0 < largest.1 + 1e-5, "{name} from {start}: {largest:?}");
         }
     }
+}
+
+/// One light on its way past a receiver: from touching distance to afar, rising through the horizon and turning.
+fn light_on_its_way(way: f64) -> [Vec3; 3] {
+    let distance = 0.05 * 4000f64.powf(way);
+    let (turn, height) = (6.0 * way, distance * (4.0 * way).sin());
+    let centre = DVec3::new(distance * turn.cos(), distance * turn.sin(), height);
+    let facing = -centre.normalize_or_zero();
+    let side = facing.any_orthonormal_vector();
+    let up = facing.cross(side);
+    [(-0.5, -0.3), (0.5, -0.3), (0.1, 0.6)].map(|(u, v)| (centre + side * u + up * v).as_vec3())
+}
+
+#[test]
+fn a_light_on_its_way_does_not_jump() {
+    for (name, eps) in [("exact", 0.0), ("within 1e-3", 1e-3), ("within 1e-2", 1e-2)] {
+        let bound = ErrorBound::new(eps);
+        let (mut worst, mut crossings) = (0.0f64, 0);
+        for window in 0..4000 {
+            let mut before: Option<(f64, f64)> = None;
+            for step in 0..12 {
+                let way = f64::from(window) / 4000.0 + 1e-6 * f64::from(step);
+                let case = Case { corners: light_on_its_way(way), x: Vec3::ZERO, n: Vec3::Z };
+                let Some(truth) = truth(&case).filter(|t| t.uncosined > 0.0) else { continue };
+                let now = form_factor_within(&case.light(), case.x, case.n, &bound);
+                let now = (f64::from(now) / truth.uncosined, truth.form_factor / truth.uncosined);
+                if let Some(last) = before {
+                    worst = worst.max((now.0 - last.0).abs() - (now.1 - last.1).abs());
+                }
+                crossings += u32::from(truth.crosses);
+                before = Some(now);
+            }
+        }
+        assert!(crossings > 1000, "{crossings}");
+        // A fade from one form to the next spans 30 % of tau^2, so a step of 1e-6 moves it by less than 1e-4 of eps.
+        assert!(worst < 2e-6 + 1e-4 * f64::from(eps), "{name}: {worst:.1e} of U");
+    }
+}
+
+#[test]
+fn an_abrupt_switch_would_be_seen() {
+    let bound = ErrorBound::new(1e-2);
+    let [near, far] = [0.999_999, 1.000_001].map(|stretch| {
+        let corners = light_on_its_way(0.5).map(|v| v * stretch);
+        let case = Case { corners, x: Vec3::ZERO, n: Vec3::Z };
+        (form_factor(&case.light(), case.x, case.n), centroid_form_factor(&case.light(), case.x, case.n))
+    });
+    let jump = f64::from((near.0 - far.1).abs() / near.0);
+    assert!(jump > 2e-6 + 1e-4 * f64::from(bound.centroid), "{jump}");
+}
+
+#[test]
+fn blocks_keep_the_error_of_sums_where_a_plain_sum_loses_it() {
+    let triangles = sphere(6);
+    let lights = LightSet {
+        geometry: lights(&triangles),
+        tags: vec![0; triangles.len()],
+        emission: vec![Vec3::ZERO; triangles.len()],
+        sample_starts: vec![0; triangles.len() + 1],
+        samples: Vec::new(),
+    };
+    let receiver =
+        Receiver { position: Vec3::new(0.3, 0.2, -0.1), normal: Vec3::Z, geometric_normal: Vec3::Z, tag: 0 };
+    let each: Vec<f32> =
+        lights.geometry.iter().map(|light| form_factor(light, receiver.position, receiver.normal)).collect();
+    let exact: f64 = each.iter().map(|&f| f64::from(f)).sum();
+    let plain = f64::from(each.iter().sum::<f32>()) - exact;
+    let list: Vec<u32> = (0..triangles.len() as u32).collect();
+    let radiosity = vec![Vec3::ONE; triangles.len()];
+    let together = gather_together(&lights, &radiosity, &list, &[receiver]);
+    let blocks = f64::from(together[0].irradiance.x) - exact;
+    println!("{} lights: plain sum off by {plain:.1e}, blocks by {blocks:.1e}", triangles.len());
+    assert!((exact - 1.0).abs() < 1e-5, "{exact}");
+    assert!(blocks.abs() < 2e-6, "{blocks}");
+    assert!(plain.abs() > 2.0 * blocks.abs(), "blocks would not be needed: {plain} {blocks}");
 }
 
 #[test]

@@ -1,6 +1,5 @@
 //! Pictures on the CPU: direct light, and indirect light by path tracing or by virtual lights.
 
-use std::collections::BTreeMap;
 use std::time::Instant;
 
 use glam::{DMat4, Vec3};
@@ -302,21 +301,18 @@ impl<'a> LitScene<'a> {
         points: &[Option<SurfacePoint>],
         list_at: impl Fn(Vec3) -> &'l [u32],
     ) -> Vec<Gathered> {
-        let mut lists: BTreeMap<(*const u32, usize), (&[u32], Vec<usize>)> = BTreeMap::new();
-        for (pixel, point) in points.iter().enumerate() {
-            if let Some(point) = point {
-                let list = list_at(point.position);
-                let entry = lists.entry((list.as_ptr(), list.len())).or_insert_with(|| (list, Vec::new()));
-                entry.1.push(pixel);
-            }
-        }
+        let with_list = |(pixel, point): (usize, &Option<SurfacePoint>)| {
+            point.as_ref().map(|point| (list_at(point.position), pixel, self.receiver(point)))
+        };
+        let mut all: Vec<_> = points.iter().enumerate().filter_map(with_list).collect();
+        all.sort_by_key(|(list, ..)| list.as_ptr());
         let mut gathered = vec![Gathered::default(); points.len()];
-        for (list, pixels) in lists.values() {
-            let receivers: Vec<Receiver> =
-                pixels.iter().filter_map(|&pixel| Some(self.receiver(points[pixel].as_ref()?))).collect();
-            let together = gather_together(&self.lights, &self.radiosity, list, &receivers);
-            for (&pixel, result) in pixels.iter().zip(together) {
-                gathered[pixel] = result;
+        for together in all.chunk_by(|(a, ..), (b, ..)| std::ptr::eq(*a, *b)) {
+            let receivers: Vec<Receiver> = together.iter().map(|(.., receiver)| *receiver).collect();
+            let list = together.first().map_or(&[] as &[u32], |(list, ..)| *list);
+            let results = gather_together(&self.lights, &self.radiosity, list, &receivers);
+            for ((_, pixel, _), result) in together.iter().zip(results) {
+                gathered[*pixel] = result;
             }
         }
         gathered

@@ -101,7 +101,7 @@ fn is_shown((kind, case): &(Kind, Case)) -> bool {
 
 fn bin_of(case: &Case) -> Option<usize> {
     let decade = (case.distance() / case.size()).log10();
-    (decade >= DECADES.0 && decade < DECADES.1).then(|| ((decade - DECADES.0) * PER_DECADE) as usize)
+    (decade >= DECADES.0 && decade < DECADES.1).then_some(((decade - DECADES.0) * PER_DECADE) as usize)
 }
 
 fn points(bins: &[Errors]) -> Vec<Point> {
