@@ -282,40 +282,30 @@ impl<'a> LitScene<'a> {
         list_at: impl Fn(Vec3) -> &'l [u32] + Sync,
     ) -> (Vec<Vec3>, RenderStats) {
         let start = Instant::now();
-        let tiles = gbuffer.points.par_chunks(PIXELS_TOGETHER);
-        progress.begin("gather", tiles.len() as u64);
-        let gathered: Vec<Gathered> = tiles
-            .flat_map_iter(|points| {
-                progress.advance(1);
-                self.gather_tile(points, &list_at)
-            })
-            .collect();
-        let seconds = PhaseSeconds { inject: self.inject_seconds, gather: start.elapsed().as_secs_f64() };
-        let pairs_evaluated = gathered.iter().map(|g| g.pairs).sum();
-        let stats = RenderStats { seconds, pairs_evaluated, lights: self.lights.len() as u32 };
-        (gathered.iter().map(|g| g.irradiance).collect(), stats)
-    }
-
-    fn gather_tile<'l>(
-        &self,
-        points: &[Option<SurfacePoint>],
-        list_at: impl Fn(Vec3) -> &'l [u32],
-    ) -> Vec<Gathered> {
         let with_list = |(pixel, point): (usize, &Option<SurfacePoint>)| {
             point.as_ref().map(|point| (list_at(point.position), pixel, self.receiver(point)))
         };
-        let mut all: Vec<_> = points.iter().enumerate().filter_map(with_list).collect();
-        all.sort_by_key(|(list, ..)| list.as_ptr());
-        let mut gathered = vec![Gathered::default(); points.len()];
-        for together in all.chunk_by(|(a, ..), (b, ..)| std::ptr::eq(*a, *b)) {
-            let receivers: Vec<Receiver> = together.iter().map(|(.., receiver)| *receiver).collect();
-            let list = together.first().map_or(&[] as &[u32], |(list, ..)| *list);
-            let results = gather_together(&self.lights, &self.radiosity, list, &receivers);
-            for ((_, pixel, _), result) in together.iter().zip(results) {
-                gathered[*pixel] = result;
-            }
+        let mut all: Vec<_> = gbuffer.points.par_iter().enumerate().filter_map(with_list).collect();
+        all.par_sort_unstable_by_key(|&(list, pixel, _)| (list.as_ptr(), pixel));
+        let by_list = all.chunk_by(|(a, ..), (b, ..)| std::ptr::eq(*a, *b));
+        let tasks: Vec<_> = by_list.flat_map(|pixels| pixels.chunks(PIXELS_TOGETHER)).collect();
+        progress.begin("gather", tasks.len() as u64);
+        let gather = |pixels: &&[(&[u32], usize, Receiver)]| {
+            progress.advance(1);
+            let receivers: Vec<Receiver> = pixels.iter().map(|(.., receiver)| *receiver).collect();
+            let list = pixels.first().map_or(&[] as &[u32], |(list, ..)| *list);
+            gather_together(&self.lights, &self.radiosity, list, &receivers)
+        };
+        let gathered: Vec<Vec<Gathered>> = tasks.par_iter().map(gather).collect();
+        let mut irradiance = vec![Vec3::ZERO; gbuffer.points.len()];
+        let mut pairs_evaluated = 0;
+        for ((_, pixel, _), gathered) in all.iter().zip(gathered.iter().flatten()) {
+            irradiance[*pixel] = gathered.irradiance;
+            pairs_evaluated += gathered.pairs;
         }
-        gathered
+        let seconds = PhaseSeconds { inject: self.inject_seconds, gather: start.elapsed().as_secs_f64() };
+        let stats = RenderStats { seconds, pairs_evaluated, lights: self.lights.len() as u32 };
+        (irradiance, stats)
     }
 
     /// A surface point as phase 2 sees it.

@@ -145,11 +145,23 @@ impl WithSimd for Batch<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
+        // The lists of a large tile take longer to clear than a handful of receivers to evaluate.
+        if self.receivers.len <= SMALL_TILE {
+            self.by_tiles::<S, SMALL_TILE>(simd);
+        } else {
+            self.by_tiles::<S, TILE>(simd);
+        }
+    }
+}
+
+impl Batch<'_> {
+    #[inline(always)]
+    fn by_tiles<S: Simd, const SIZE: usize>(self, simd: S) {
         let count = self.receivers.len.min(self.results.len());
-        let tiles = self.receivers.blocks.chunks(TILE / LANES);
-        let mut waiting = [Waiting::NONE; CLASSES];
-        for (i, (blocks, results)) in tiles.zip(self.results[..count].chunks_mut(TILE)).enumerate() {
-            let surfaces = self.receivers.surfaces.get(i * (TILE / LANES)..).unwrap_or(&[]);
+        let tiles = self.receivers.blocks.chunks(SIZE / LANES);
+        let mut waiting = [Waiting::<SIZE>::NONE; CLASSES];
+        for (i, (blocks, results)) in tiles.zip(self.results[..count].chunks_mut(SIZE)).enumerate() {
+            let surfaces = self.receivers.surfaces.get(i * (SIZE / LANES)..).unwrap_or(&[]);
             tile(simd, self.light, blocks, surfaces, results, &mut waiting);
         }
     }
@@ -158,29 +170,32 @@ impl WithSimd for Batch<'_> {
 /// Receivers per round of far lanes and close ones: what the lists of close ones hold. Fewer leave registers half empty.
 const TILE: usize = 4096;
 
+/// The same for a few receivers, such as the pixels of a grid's cell.
+const SMALL_TILE: usize = 64;
+
 /// Kinds of close receivers, which take forms of different length: the light is whole, or one or two of its corners are
 /// above the horizon.
 const CLASSES: usize = 3;
 
 /// Receivers of a tile that wait for one of the slower forms.
 #[derive(Clone, Copy)]
-struct Waiting {
-    lanes: [u16; TILE],
+struct Waiting<const SIZE: usize> {
+    lanes: [u16; SIZE],
     count: usize,
 }
 
-impl Waiting {
-    const NONE: Self = Self { lanes: [0; TILE], count: 0 };
+impl<const SIZE: usize> Waiting<SIZE> {
+    const NONE: Self = Self { lanes: [0; SIZE], count: 0 };
 }
 
 #[inline(always)]
-fn tile<S: Simd>(
+fn tile<S: Simd, const SIZE: usize>(
     simd: S,
     light: &LightGeometry,
     blocks: &[Block],
     surfaces: &[[[f32; LANES]; 3]],
     results: &mut [f32],
-    waiting: &mut [Waiting; CLASSES],
+    waiting: &mut [Waiting<SIZE>; CLASSES],
 ) {
     for list in waiting.iter_mut() {
         list.count = 0;
@@ -200,10 +215,10 @@ fn tile<S: Simd>(
         results.copy_from_slice(&far[..results.len()]);
     }
     let [whole, one_above, two_above] = waiting;
-    finish::<S, true>(simd, light, whole, blocks, results);
+    finish::<S, SIZE, true>(simd, light, whole, blocks, results);
     // Apart, as the second triangle of a quad is not evaluated for a register of triangles.
-    finish::<S, false>(simd, light, one_above, blocks, results);
-    finish::<S, false>(simd, light, two_above, blocks, results);
+    finish::<S, SIZE, false>(simd, light, one_above, blocks, results);
+    finish::<S, SIZE, false>(simd, light, two_above, blocks, results);
 }
 
 /// A bit per lane that is above 0.
@@ -218,10 +233,10 @@ fn bits(class: &[f32; LANES]) -> u32 {
 
 /// Evaluates the receivers that wait, a register at a time: lights wholly above the horizon, or cut by it.
 #[inline(always)]
-fn finish<S: Simd, const IS_WHOLE: bool>(
+fn finish<S: Simd, const SIZE: usize, const IS_WHOLE: bool>(
     simd: S,
     light: &LightGeometry,
-    waiting: &Waiting,
+    waiting: &Waiting<SIZE>,
     blocks: &[Block],
     results: &mut [f32],
 ) {
