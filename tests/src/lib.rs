@@ -18,3 +18,8 @@ pub mod proof;
 pub mod exr;
 pub mod truth;
 pub mod pareto;
+pub mod device;
+pub mod slope;
+pub mod room;
+pub mod text;
+pub mod grid_bench;

@@ -3,6 +3,8 @@
 mod render;
 mod report;
 mod pareto;
+mod grid;
+mod output;
 
 use std::process::ExitCode;
 
@@ -24,6 +26,8 @@ enum Command {
     Report(report::ReportArgs),
     /// Run every method over its knobs: time against error
     Pareto(pareto::ParetoArgs),
+    /// Build time of the grid against lights and cells, beside the thesis' build
+    Grid(grid::GridArgs),
     /// Form factors of a file of cases, or the stress test
     FormFactor(command::FormFactorArgs),
     /// Measure the form factor's throughput on one core
@@ -35,6 +39,7 @@ fn main() -> ExitCode {
         Command::Render(args) => render::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Pareto(args) => pareto::command(&args),
         Command::Report(args) => report::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Grid(args) => grid::run(&args).map(|()| ExitCode::SUCCESS),
         Command::FormFactor(args) => command::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Kernel(args) => {
             command::run_kernel(&args);
