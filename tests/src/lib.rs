@@ -23,3 +23,4 @@ pub mod slope;
 pub mod room;
 pub mod text;
 pub mod grid_bench;
+pub mod bake_bench;
