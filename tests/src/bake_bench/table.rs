@@ -89,7 +89,7 @@ fn seconds(value: f64) -> String {
 pub fn summary(run: &Run) -> String {
     let repeats = run.samples.iter().map(|sample| sample.repeat).collect::<BTreeSet<_>>().len();
     let gltfpack = match &run.gltfpack {
-        Ok(version) => format!("`gltfpack -si 0.1`: {version}, whole process, one thread"),
+        Ok(version) => format!("`gltfpack -si 0.1`: {version} of PATH, whole process"),
         Err(reason) => format!("`gltfpack`: {reason}"),
     };
     let mut text = format!(
