@@ -33,7 +33,7 @@ fn figure(scene: &str, rows: &[Row]) -> Figure {
         subtitle: rows.first().map_or_else(String::new, |row| {
             format!("{}, {} threads; lights reach {} radii", row.device, row.threads, row.range)
         }),
-        x: Axis::log("lights x cells of the cube"),
+        x: Axis::log("lights x cells"),
         y: Axis::log("build time (s)"),
         curves: curves.into_iter().flatten().collect(),
     }

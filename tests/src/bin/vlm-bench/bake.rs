@@ -18,8 +18,8 @@ const SCENES: [&str; 5] = ["cornell_sphere", "veach_ajar", "sibenik", "dungeon",
 /// Flags of `vlm-bench bake`.
 #[derive(Args)]
 pub struct BakeArgs {
-    /// Triangles of the rooms made in memory: numbers separated by commas, or A..B in steps of ten. 1e7 takes some minutes and
-    /// gigabytes
+    /// Triangles of the rooms made in memory: numbers separated by commas, or A..B in steps of ten. 1e7 takes a minute a repeat and
+    /// 5 GB
     #[arg(long, value_name = "NS|A..B", default_value = "1e3..1e6", value_parser = sizes)]
     triangles: Sizes,
     /// Real scenes, separated by commas; `none` for none [default: those of cornell_sphere, veach_ajar, sibenik, dungeon and
