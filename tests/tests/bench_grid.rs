@@ -57,6 +57,8 @@ fn what_is_wrong_is_said_and_nothing_is_printed() {
         (&["--scenes", "nowhere"][..], "`nowhere`"),
         (&["--cells", "0"], "--cells"),
         (&["--lights", "many"], "--lights"),
+        (&["--range", "NaN"], "--range"),
+        (&["--limit", "0"], "--limit"),
     ] {
         let done = grid(args);
         assert_eq!(done.status.code(), Some(2));

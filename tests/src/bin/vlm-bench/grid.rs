@@ -24,8 +24,8 @@ pub struct GridArgs {
         value_parser = clap::value_parser!(u32).range(1..=256))]
     cells: Vec<u32>,
     /// Reach of a light over its own radius; 8 is what the preset `game` bakes
-    #[arg(long, value_name = "R", default_value_t = 8.0)]
-    range: f32,
+    #[arg(long, value_name = "R", default_value_t = 8.0, value_parser = positive)]
+    range: f64,
     /// Thesis: entries of each cell's list
     #[arg(long, value_name = "K", default_value_t = 128, value_parser = clap::value_parser!(u32).range(1..))]
     list: u32,
@@ -33,7 +33,7 @@ pub struct GridArgs {
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u64).range(100..=20_000_000))]
     surface: u64,
     /// Thesis: leave out builds that would take longer than so many seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = 20.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 20.0, value_parser = positive)]
     limit: f64,
     /// Interleaved repeats, of which the median counts
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
@@ -41,6 +41,11 @@ pub struct GridArgs {
     /// Also write raw.csv, table.md and a figure per scene into this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|value| value.is_finite() && *value > 0.0);
+    value.ok_or_else(|| "expected a number above 0".to_owned())
 }
 
 /// Runs the command.
@@ -52,7 +57,7 @@ pub fn run(args: &GridArgs) -> Result<(), Box<dyn Error>> {
         scenes: args.scenes.clone().unwrap_or_else(default_scenes),
         lights: args.lights.clone(),
         cells: args.cells.clone(),
-        range: args.range,
+        range: args.range as f32,
         list: args.list,
         surface: args.surface,
         limit: args.limit,
