@@ -43,9 +43,33 @@ impl Glb {
 
     /// Stores a mesh's arrays and returns its glTF primitive.
     pub fn primitive(&mut self, mesh: &Mesh, material: usize) -> Value {
-        let position = self.push_vec3(&mesh.positions, true);
-        let normal = self.push_vec3(&mesh.normals, false);
-        let indices = self.push_indices(&mesh.indices);
+        let bytes: Vec<u8> = mesh.indices.iter().flat_map(|i| i.to_le_bytes()).collect();
+        self.primitive_of((&mesh.positions, &mesh.normals), (5123, mesh.indices.len(), &bytes), material)
+    }
+
+    /// As [`Glb::primitive`], for more than 65,536 vertices.
+    #[must_use]
+    pub fn large_primitive(
+        &mut self,
+        positions: &[[f32; 3]],
+        normals: &[[f32; 3]],
+        indices: &[u32],
+        material: usize,
+    ) -> Value {
+        let bytes: Vec<u8> = indices.iter().flat_map(|i| i.to_le_bytes()).collect();
+        self.primitive_of((positions, normals), (5125, indices.len(), &bytes), material)
+    }
+
+    /// Indices by their component type, their number and their bytes.
+    fn primitive_of(
+        &mut self,
+        (positions, normals): (&[[f32; 3]], &[[f32; 3]]),
+        (component, count, indices): (u32, usize, &[u8]),
+        material: usize,
+    ) -> Value {
+        let position = self.push_vec3(positions, true);
+        let normal = self.push_vec3(normals, false);
+        let indices = self.push_indices(component, count, indices);
         json!({
             "attributes": { "POSITION": position, "NORMAL": normal },
             "indices": indices,
@@ -96,13 +120,12 @@ impl Glb {
         self.accessors.len() - 1
     }
 
-    fn push_indices(&mut self, indices: &[u16]) -> usize {
-        let bytes: Vec<u8> = indices.iter().flat_map(|i| i.to_le_bytes()).collect();
-        let view = self.push_view(&bytes, 34963);
+    fn push_indices(&mut self, component: u32, count: usize, bytes: &[u8]) -> usize {
+        let view = self.push_view(bytes, 34963);
         self.accessors.push(json!({
             "bufferView": view,
-            "componentType": 5123,
-            "count": indices.len(),
+            "componentType": component,
+            "count": count,
             "type": "SCALAR",
         }));
         self.accessors.len() - 1

@@ -105,6 +105,12 @@ impl ThesisGrid {
         size_of_val(self.lists.as_slice()) as u64
     }
 
+    /// Ids that the lists hold, padding not counted.
+    #[must_use]
+    pub fn entries(&self) -> u64 {
+        self.lists.iter().filter(|&&id| id != NULL).count() as u64
+    }
+
     /// The lights of the cell that holds `p`; points outside use the nearest cell.
     pub fn lights_at(&self, p: Vec3) -> impl Iterator<Item = u32> + '_ {
         let position =

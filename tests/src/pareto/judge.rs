@@ -1,6 +1,5 @@
 //! What pictures are worth: rows of `raw.csv`, and the pictures themselves as files.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -9,6 +8,7 @@ use glam::Vec3;
 use super::names::file_name;
 use super::row::Row;
 use super::run::{Contestant, RunError, RunOptions, create_folder, failed};
+use crate::device::processor;
 use crate::exact::ExactPixels;
 use crate::exr;
 use crate::method::{MethodError, Picture, View};
@@ -152,13 +152,4 @@ fn algorithm_rmse(
         }
     };
     Ok(sums[index].relative_rmse(&picture.indirect))
-}
-
-/// The processor in its own words, where the system tells.
-fn processor() -> String {
-    let told = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
-        let line = text.lines().find(|line| line.starts_with("model name"))?;
-        Some(line.split_once(':')?.1.trim().to_owned())
-    });
-    told.unwrap_or_else(|| std::env::consts::ARCH.to_owned())
 }

@@ -3,6 +3,9 @@
 mod render;
 mod report;
 mod pareto;
+mod grid;
+mod bake;
+mod output;
 
 use std::process::ExitCode;
 
@@ -24,6 +27,13 @@ enum Command {
     Report(report::ReportArgs),
     /// Run every method over its knobs: time against error
     Pareto(pareto::ParetoArgs),
+    /// Build time of the grid against lights and cells, beside the thesis' build
+    Grid(grid::GridArgs),
+    /// Seconds of each bake stage and peak memory against triangles, beside gltfpack
+    Bake(bake::BakeArgs),
+    /// One bake, in the process whose memory `bake` measures
+    #[command(hide = true)]
+    BakeChild(bake::ChildArgs),
     /// Form factors of a file of cases, or the stress test
     FormFactor(command::FormFactorArgs),
     /// Measure the form factor's throughput on one core
@@ -35,6 +45,9 @@ fn main() -> ExitCode {
         Command::Render(args) => render::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Pareto(args) => pareto::command(&args),
         Command::Report(args) => report::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Grid(args) => grid::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Bake(args) => bake::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::BakeChild(args) => bake::run_child(&args).map(|()| ExitCode::SUCCESS),
         Command::FormFactor(args) => command::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Kernel(args) => kernel::run(&args).map(|()| ExitCode::SUCCESS),
     };

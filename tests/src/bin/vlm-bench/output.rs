@@ -1,0 +1,12 @@
+//! Where commands write.
+
+use std::error::Error;
+use std::path::Path;
+
+/// Makes a folder, and those above it.
+///
+/// # Errors
+/// The folder and the system's reason.
+pub fn make_folder(folder: &Path) -> Result<(), Box<dyn Error>> {
+    std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()).into())
+}
