@@ -6,7 +6,8 @@
 const TINY: f32 = 1e-30;
 const CLOSEST: f32 = 0.1;
 const NEAREST_OVER_AREA: f32 = 0.3;
-const GREATEST_ARGUMENT: f32 = 1.03;
+const NEAREST_EDGE: f32 = 0.12;
+const GREATEST_ARGUMENT: f32 = 1.2;
 const HALF_PI: f32 = 1.57079637;
 const INVERSE_PI: f32 = 0.318309886;
 const INVERSE_TAU: f32 = 0.159154943;
@@ -66,7 +67,7 @@ struct Apex {
     altitude: vec3f,
     stretch: f32,
     base: vec3f,
-    reach: f32,
+    edge_reach: f32,
     r_altitude: vec3f,
     foot_base: vec3f,
     normal: vec3f,
@@ -131,33 +132,39 @@ fn to_unit(x: f32) -> f32 {
 }
 
 fn arctangent_excess(t: f32) -> f32 {
-    var q = 0.0029746052;
-    q = q * t - 0.016581241;
-    q = q * t + 0.043553628;
-    q = q * t - 0.07580585;
-    q = q * t + 0.10678943;
-    q = q * t - 0.1421421;
-    q = q * t + 0.19994137;
-    q = q * t - 0.33333167;
+    var q = 0.0005837857;
+    q = q * t - 0.0046142703;
+    q = q * t + 0.01673454;
+    q = q * t - 0.037888978;
+    q = q * t + 0.06270793;
+    q = q * t - 0.0861641;
+    q = q * t + 0.11012069;
+    q = q * t - 0.14274228;
+    q = q * t + 0.1999941;
+    q = q * t - 0.33333325;
     return q * t;
 }
 
 // The excess at t, and its divided difference between t and u.
 fn excess_and_slope(t: f32, u: f32) -> vec2f {
-    var slope = 0.0029746052;
-    var q = slope * t - 0.016581241;
+    var slope = 0.0005837857;
+    var q = slope * t - 0.0046142703;
     slope = slope * u + q;
-    q = q * t + 0.043553628;
+    q = q * t + 0.01673454;
     slope = slope * u + q;
-    q = q * t - 0.07580585;
+    q = q * t - 0.037888978;
     slope = slope * u + q;
-    q = q * t + 0.10678943;
+    q = q * t + 0.06270793;
     slope = slope * u + q;
-    q = q * t - 0.1421421;
+    q = q * t - 0.0861641;
     slope = slope * u + q;
-    q = q * t + 0.19994137;
+    q = q * t + 0.11012069;
     slope = slope * u + q;
-    q = q * t - 0.33333167;
+    q = q * t - 0.14274228;
+    slope = slope * u + q;
+    q = q * t + 0.1999941;
+    slope = slope * u + q;
+    q = q * t - 0.33333325;
     return vec2f(q * t, slope * u + q);
 }
 
@@ -371,9 +378,10 @@ fn triangle_sum(triangle: Triangle, n: vec3f) -> Sum {
     let r_altitude = cross(r0, triangle.altitude);
     let area = sqrt(dot(triangle.altitude, triangle.altitude) * triangle.base_squared);
     let reach = area * NEAREST_OVER_AREA;
+    let edge_reach = area * NEAREST_EDGE;
     let stretch = dot(triangle.altitude, foot + r0) / max(lengths.w + lengths.x, TINY);
     let apex = Apex(
-        r0, lengths.x, triangle.altitude, stretch, triangle.base, reach, r_altitude, r_base + triangle.normal,
+        r0, lengths.x, triangle.altitude, stretch, triangle.base, edge_reach, r_altitude, r_base + triangle.normal,
         triangle.normal,
     );
     let half_1 = near_half(apex, r1, lengths.y, -p);
@@ -425,7 +433,7 @@ fn near_half(apex: Apex, end: vec3f, end_length: f32, share: f32) -> NearHalf {
     let right = HALF_PI / c_length;
     let right_step = -right * s_step / (foot_length * (c_length + foot_length));
     let edge_squared = max(dot(edge, edge), TINY);
-    let passes_far = apex.reach * edge_squared < s && apex.reach * c_foot_edge < s_foot;
+    let passes_far = apex.edge_reach * edge_squared < s && apex.edge_reach * c_foot_edge < s_foot;
     return NearHalf(
         select(right - core, core, is_small),
         select(right_step - core_step, core_step, is_small),

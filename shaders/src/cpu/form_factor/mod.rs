@@ -31,8 +31,8 @@ use real::{Real, Vector};
 
 /// The form factor of `light` at the point `x` with unit normal `n`, 0 to 1: irradiance per radiosity.
 ///
-/// 0 behind the light's plane and below the horizon. A normal of another length scales the result, which stays within
-/// 0 to 1. NaN in any input gives 0.
+/// 0 behind the light's plane, below the horizon, and farther than 4e9 times the light's size. A normal of another length,
+/// from 1e-18 on, scales the result, which stays within 0 to 1. NaN in any input gives 0.
 #[must_use]
 pub fn form_factor(light: &LightGeometry, x: Vec3, n: Vec3) -> f32 {
     let (x, n) = (Vector::from(x), Vector::from(n));

@@ -17,9 +17,12 @@ const TINY: f32 = 1e-30;
 /// large weights.
 const NEAREST_OVER_AREA: f32 = 0.3;
 
+/// The same for an edge that is seen under more than 90 degrees and may pass closer than its ends.
+const NEAREST_EDGE: f32 = 0.12;
+
 /// How far beyond 1 the arctangent's fit may be used: the edges of a thin triangle seen under nearly 90 degrees lie on
-/// either side of it. The fit errs by 1e-7 there.
-const GREATEST_ARGUMENT: f32 = 1.03;
+/// either side of it.
+const GREATEST_ARGUMENT: f32 = 1.2;
 
 /// `-pi F` of a whole light above the horizon; `corners` are the light's, light units.
 ///
@@ -144,8 +147,9 @@ impl<R: Real> Triangle<R> {
         };
         let area = (altitude.dot(altitude) * base_squared).root();
         let reach = area * area.splat(NEAREST_OVER_AREA);
-        let half_1 = apex.half(r1, lengths[1], -p, reach);
-        let half_2 = apex.half(r2, lengths[2], q, reach);
+        let edge_reach = area * area.splat(NEAREST_EDGE);
+        let half_1 = apex.half(r1, lengths[1], -p, edge_reach);
+        let half_2 = apex.half(r2, lengths[2], q, edge_reach);
 
         // k20 - k01 = |r| (|r2| - |r1|) + r.a
         let spread = base.dot(r1 + r2) / (lengths[1] + lengths[2]).at_least(TINY);
@@ -209,7 +213,7 @@ impl<R: Real> Apex<R> {
     /// above              W = pi / (2 |c|) - (1 + g(t)) i,  i = k / |c|^2,  t = k i
     /// ```
     #[inline(always)]
-    fn half(&self, end: Vector<R>, end_length: R, share: R, reach: R) -> Half<R> {
+    fn half(&self, end: Vector<R>, end_length: R, share: R, edge_reach: R) -> Half<R> {
         let k_step = end_length.times_plus(self.stretch, end.dot(self.altitude));
         let edge = self.altitude.along(share, self.base);
         // From the nearer end, as the other would leave it no digits.
@@ -245,7 +249,7 @@ impl<R: Real> Apex<R> {
         let limit = k.splat(GREATEST_ARGUMENT);
         // Seen under more than 90 degrees, an edge may pass closer than its ends.
         let edge_squared = edge.dot(edge).at_least(TINY);
-        let passes_far = (reach * edge_squared).below(s) & (reach * c_foot_edge).below(s_foot);
+        let passes_far = (edge_reach * edge_squared).below(s) & (edge_reach * c_foot_edge).below(s_foot);
         Half {
             weight: R::select(is_small, core, right - core),
             step: R::select(is_small, core_step, right_step - core_step),

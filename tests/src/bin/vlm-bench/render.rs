@@ -7,9 +7,13 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use vlm_bake::picture::{read_irradiance, write_irradiance, write_png};
 use vlm_bake::progress::Silent;
-use vlm_bake::render::{Method, RenderError, RenderOptions, RenderReport, Rendering, render};
+use vlm_bake::render::{Method, RenderError, RenderOptions, RenderReport, RenderStats, Rendering, render};
 use vlm_bake::scene::{Camera, LoadOptions, Scene, load};
+use vlm_bake::shade::TraceScene;
 use vlm_format::{GltfFile, VlmAsset, read_vlm};
+use vlm_tests::method::{Method as CompareMethod, MethodError, Picture, Stage, View};
+use vlm_tests::methods::ddgi::Ddgi;
+use vlm_tests::methods::instant_radiosity::InstantRadiosity;
 use vlm_tests::metrics::{Comparison, Metrics, compare_shown};
 use vlm_tests::thesis::{self, ThesisOptions};
 
@@ -39,6 +43,18 @@ pub struct RenderArgs {
     /// Thesis: cells along each axis
     #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=512))]
     grid: u32,
+    /// Instant radiosity: virtual point lights
+    #[arg(long, value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..))]
+    lights: u32,
+    /// Instant radiosity: distance below which a light grows no brighter, as a share of the scene's extent
+    #[arg(long, value_name = "SHARE", default_value_t = 0.05)]
+    clamp: f32,
+    /// DDGI: probe spacings along the scene's longest axis
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..=128))]
+    cells: u32,
+    /// DDGI: rays per probe
+    #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..))]
+    rays: u32,
     /// Write the picture, tone mapped
     #[arg(long, value_name = "IMG.png")]
     out: Option<PathBuf>,
@@ -65,6 +81,10 @@ enum MethodArg {
     Reference,
     /// Aquotte 2017: active hemispheres, lists of fixed size, the textbook formula in single precision
     Thesis,
+    /// Keller 1997: virtual point lights with shadow rays, clamped
+    InstantRadiosity,
+    /// Probes as in Majercik et al. 2019: octahedral irradiance and depth moments
+    Ddgi,
 }
 
 /// What the thesis' lists held.
@@ -100,7 +120,7 @@ pub fn size(text: &str) -> Result<(u32, u32), String> {
 pub fn run(args: &RenderArgs) -> Result<(), Box<dyn Error>> {
     let file = GltfFile::open(&args.file)?;
     let scene = load(&file, &LoadOptions::default())?;
-    let needs_lights = !matches!(args.method, MethodArg::Direct | MethodArg::Reference);
+    let needs_lights = matches!(args.method, MethodArg::Vlm | MethodArg::Brute | MethodArg::Thesis);
     let asset = if needs_lights { read_vlm(&file)? } else { None };
     let camera = scene.camera(args.camera.as_deref())?;
     let (rendering, thesis) = render_by(args, &scene, asset.as_ref(), &camera)?;
@@ -134,8 +154,16 @@ fn render_by(
     scene: &Scene,
     asset: Option<&VlmAsset>,
     camera: &Camera,
-) -> Result<(Rendering, Option<ThesisReport>), RenderError> {
+) -> Result<(Rendering, Option<ThesisReport>), MethodError> {
     let method = match args.method {
+        MethodArg::InstantRadiosity => {
+            let method = InstantRadiosity { lights: args.lights, clamp: args.clamp };
+            return Ok((render_method(args, scene, camera, &method)?, None));
+        }
+        MethodArg::Ddgi => {
+            let method = Ddgi { cells: args.cells as f32, rays: args.rays };
+            return Ok((render_method(args, scene, camera, &method)?, None));
+        }
         MethodArg::Thesis => {
             let options = ThesisOptions { range: args.range, list: args.list, grid: args.grid };
             let asset = asset.ok_or(RenderError::NoLights)?;
@@ -155,6 +183,22 @@ fn render_by(
     let (width, height) = args.size;
     let options = RenderOptions { width, height, method, samples: args.spp, alpha_masks: false };
     Ok((render(scene, asset, camera, &options, &Silent)?, None))
+}
+
+/// A frame by a method of the comparison.
+fn render_method(
+    args: &RenderArgs,
+    scene: &Scene,
+    camera: &Camera,
+    method: &dyn CompareMethod,
+) -> Result<Rendering, MethodError> {
+    let trace = TraceScene::new(scene);
+    let view = View::new(&trace, camera, args.size);
+    let Picture { indirect, seconds, lights, pairs, .. } =
+        method.prepare(&Stage::new(&trace))?.render(&view, 0)?;
+    let direct = view.gbuffer.direct_irradiance(&trace);
+    let stats = RenderStats { seconds, pairs_evaluated: pairs, lights };
+    Ok(Rendering { gbuffer: view.gbuffer, direct, indirect, stats })
 }
 
 /// The distance from the reference that was asked for, if any.
