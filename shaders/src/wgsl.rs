@@ -8,3 +8,10 @@ pub const FORM_FACTOR: &str = include_str!("../wgsl/shared/form_factor.wgsl");
 pub fn form_factor_cases() -> String {
     format!("{FORM_FACTOR}\n{}", include_str!("../wgsl/form_factor_cases.wgsl"))
 }
+
+/// A compute shader that sums the form factors of all lights at each receiver; entry point `main`, 64 invocations per
+/// workgroup. Software devices stop loops after 65,535 rounds, so more lights need several dispatches.
+#[must_use]
+pub fn form_factor_sums() -> String {
+    format!("{FORM_FACTOR}\n{}", include_str!("../wgsl/form_factor_sums.wgsl"))
+}

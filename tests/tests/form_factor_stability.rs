@@ -7,6 +7,7 @@ use vlm_shaders::cpu::form_factor::{
 use vlm_shaders::cpu::gather::{Receiver, gather_together};
 use vlm_shaders::cpu::upload::LightSet;
 use vlm_tests::form_factor::case::Case;
+use vlm_tests::form_factor::gpu::GpuFormFactor;
 use vlm_tests::form_factor::reference::truth;
 
 /// The sphere of radius 5, `4 * 4^levels * 2` lights that face its centre.
@@ -204,4 +205,17 @@ fn lanes_agree_with_the_scalar_form() {
     let [a, b] = [&lights(&triangles)[0], &lights(&triangles)[1]];
     form_factors(a, &soa, &mut lanes);
     assert!(receivers.iter().zip(&lanes).any(|(&(x, n), f)| (form_factor(b, x, n) - f).abs() > 1e-3));
+}
+
+#[test]
+#[cfg_attr(not(has_vulkan), ignore = "no Vulkan driver")]
+fn sums_on_the_gpu_are_whole() {
+    let triangles = sphere(5);
+    let gpu =
+        GpuFormFactor::sums().expect("a Vulkan adapter: VLM_REQUIRE_GPU is set or a driver is installed");
+    let points = [(Vec3::ZERO, Vec3::Z), (Vec3::new(1.0, -2.0, 3.0), Vec3::new(0.6, 0.0, -0.8))];
+    let (sums, _) = gpu.measure_sums(&lights(&triangles), &points).expect("results from the GPU");
+    for sum in sums {
+        assert!((sum - 1.0).abs() < 2e-5, "{sum}");
+    }
 }

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
 use vlm_shaders::cpu::form_factor::{ErrorBound, LightGeometry};
 use vlm_shaders::wgsl;
 use wgpu::util::DeviceExt as _;
@@ -33,12 +34,18 @@ struct Receiver {
     padding: [f32; 2],
 }
 
+impl Receiver {
+    fn new(x: Vec3, n: Vec3) -> Self {
+        Self { x: x.to_array(), n: n.to_array(), padding: [0.0; 2] }
+    }
+}
+
 /// Buffers of one dispatch.
 struct Task {
     group: wgpu::BindGroup,
     results: wgpu::Buffer,
     back: wgpu::Buffer,
-    cases: u32,
+    count: u32,
 }
 
 /// A device with the shader compiled.
@@ -67,6 +74,14 @@ impl GpuFormFactor {
     /// As [`GpuFormFactor::new`].
     pub fn textbook() -> Result<Self, GpuError> {
         Self::with_shader(&format!("{}\n{}", wgsl::FORM_FACTOR, include_str!("textbook.wgsl")))
+    }
+
+    /// The sum over lights at each point, see [`GpuFormFactor::measure_sums`].
+    ///
+    /// # Errors
+    /// As [`GpuFormFactor::new`].
+    pub fn sums() -> Result<Self, GpuError> {
+        Self::with_shader(&wgsl::form_factor_sums())
     }
 
     fn with_shader(source: &str) -> Result<Self, GpuError> {
@@ -123,43 +138,49 @@ impl GpuFormFactor {
         if cases.is_empty() {
             return Ok(Vec::new());
         }
-        let task = self.upload(cases, bound);
+        let lights: Vec<LightGeometry> = cases.iter().map(Case::light).collect();
+        let receivers = cases.iter().map(|case| Receiver::new(case.x, case.n)).collect();
+        let task = self.upload(&lights, receivers, Some(bound));
         self.submit(&task, 1);
         self.read(&task.back)
     }
 
-    /// Exact form factors per second over cases that lie in the device's memory, from submission to completion.
+    /// The sums of all lights' form factors at each point, and pairs per second from submission to completion; only after
+    /// [`GpuFormFactor::sums`].
     ///
     /// # Errors
     /// If the device is lost.
-    pub fn pairs_per_second(&self, cases: &[Case]) -> Result<f64, GpuError> {
+    pub fn measure_sums(
+        &self,
+        lights: &[LightGeometry],
+        points: &[(Vec3, Vec3)],
+    ) -> Result<(Vec<f32>, f64), GpuError> {
         const ROUNDS: u32 = 4;
-        let task = self.upload(cases, &ErrorBound::default());
+        let receivers = points.iter().map(|&(x, n)| Receiver::new(x, n)).collect();
+        let task = self.upload(lights, receivers, None);
         // The first run compiles.
         self.submit(&task, 1);
         self.wait()?;
         let start = Instant::now();
         self.submit(&task, ROUNDS);
         self.wait()?;
-        Ok(f64::from(ROUNDS) * cases.len() as f64 / start.elapsed().as_secs_f64())
+        let pairs = f64::from(ROUNDS) * (lights.len() * points.len()) as f64;
+        let rate = pairs / start.elapsed().as_secs_f64();
+        Ok((self.read(&task.back)?, rate))
     }
 
-    fn upload(&self, cases: &[Case], bound: &ErrorBound) -> Task {
-        let lights: Vec<LightGeometry> = cases.iter().map(Case::light).collect();
-        let receivers: Vec<Receiver> = cases
-            .iter()
-            .map(|case| Receiver { x: case.x.to_array(), n: case.n.to_array(), padding: [0.0; 2] })
-            .collect();
-        let size = 4 * cases.len() as u64;
-        let lights = self.input("lights", bytemuck::cast_slice(&lights));
+    fn upload(&self, lights: &[LightGeometry], receivers: Vec<Receiver>, bound: Option<&ErrorBound>) -> Task {
+        let count = receivers.len() as u32;
+        let size = 4 * u64::from(count);
+        let lights = self.input("lights", bytemuck::cast_slice(lights));
         let receivers = self.input("receivers", bytemuck::cast_slice(&receivers));
         let results =
             self.buffer("results", size, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
         let back = self.buffer("back", size, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
-        let bound = self.input("bound", bytemuck::bytes_of(bound));
-        let bindings = [&lights, &receivers, &results, &bound];
+        let bound = bound.map(|bound| self.input("bound", bytemuck::bytes_of(bound)));
+        let bindings = [Some(&lights), Some(&receivers), Some(&results), bound.as_ref()];
         let entries: Vec<_> = (0..)
-            .zip(bindings)
+            .zip(bindings.into_iter().flatten())
             .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
             .collect();
         let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -167,7 +188,7 @@ impl GpuFormFactor {
             layout: &self.pipeline.get_bind_group_layout(0),
             entries: &entries,
         });
-        Task { group, results, back, cases: cases.len() as u32 }
+        Task { group, results, back, count }
     }
 
     fn submit(&self, task: &Task, rounds: u32) {
@@ -176,7 +197,7 @@ impl GpuFormFactor {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
             pass.set_pipeline(&self.pipeline);
             pass.set_bind_group(0, &task.group, &[]);
-            pass.dispatch_workgroups(task.cases.div_ceil(WORKGROUP), 1, 1);
+            pass.dispatch_workgroups(task.count.div_ceil(WORKGROUP), 1, 1);
         }
         encoder.copy_buffer_to_buffer(&task.results, 0, &task.back, 0, task.back.size());
         self.queue.submit([encoder.finish()]);

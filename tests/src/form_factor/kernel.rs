@@ -18,7 +18,6 @@ use vlm_shaders::cpu::form_factor::{
 };
 use vlm_shaders::cpu::upload::LightSet;
 
-use super::case::Case;
 use super::gpu::GpuFormFactor;
 use super::peak::peak_gflops;
 use super::textbook::{EdgeForm, textbook_form_factor};
@@ -197,24 +196,21 @@ impl Workload {
         }
     }
 
-    /// Dispatches over pairs that the GPU has in memory.
+    /// Sums over all lights at each receiver, as a gather does it.
     fn measure_gpu(&self, repeats: usize, operations: f64, peak: f64) {
-        let Ok(gpu) = GpuFormFactor::new() else {
+        let Ok(gpu) = GpuFormFactor::sums() else {
             println!("no GPU\n");
             return;
         };
-        let cases: Vec<Case> =
-            self.pairs().take(1 << 18).map(|(light, x, n)| Case { corners: light.corners(), x, n }).collect();
-        let mut rates: Vec<f64> = (0..repeats).filter_map(|_| gpu.pairs_per_second(&cases).ok()).collect();
+        let one = |_| gpu.measure_sums(&self.lights, &self.points).map(|(_, rate)| rate);
+        let mut rates: Vec<f64> = (0..repeats).filter_map(|i| one(i).ok()).collect();
         rates.sort_by(f64::total_cmp);
         if let Some(rate) = rates.get(rates.len() / 2) {
             println!("{}: {:.1} M pairs/s", gpu.name, rate / 1e6);
             if gpu.is_software {
                 let cores = std::thread::available_parallelism().map_or(1, usize::from) as f64;
-                println!(
-                    "({:.0} % of the limit of {cores} cores)",
-                    100.0 * rate * operations / 1e9 / (peak * cores)
-                );
+                let share = 100.0 * rate * operations / 1e9 / (peak * cores);
+                println!("({share:.0} % of the limit of {cores} cores)");
             }
             println!();
         }
