@@ -139,8 +139,8 @@ impl GpuFormFactor {
             return Ok(Vec::new());
         }
         let lights: Vec<LightGeometry> = cases.iter().map(Case::light).collect();
-        let receivers = cases.iter().map(|case| Receiver::new(case.x, case.n)).collect();
-        let task = self.upload(&lights, receivers, Some(bound));
+        let receivers: Vec<Receiver> = cases.iter().map(|case| Receiver::new(case.x, case.n)).collect();
+        let task = self.upload(&lights, &receivers, Some(bound));
         self.submit(&task, 1);
         self.read(&task.back)
     }
@@ -156,8 +156,8 @@ impl GpuFormFactor {
         points: &[(Vec3, Vec3)],
     ) -> Result<(Vec<f32>, f64), GpuError> {
         const ROUNDS: u32 = 4;
-        let receivers = points.iter().map(|&(x, n)| Receiver::new(x, n)).collect();
-        let task = self.upload(lights, receivers, None);
+        let receivers: Vec<Receiver> = points.iter().map(|&(x, n)| Receiver::new(x, n)).collect();
+        let task = self.upload(lights, &receivers, None);
         // The first run compiles.
         self.submit(&task, 1);
         self.wait()?;
@@ -169,11 +169,11 @@ impl GpuFormFactor {
         Ok((self.read(&task.back)?, rate))
     }
 
-    fn upload(&self, lights: &[LightGeometry], receivers: Vec<Receiver>, bound: Option<&ErrorBound>) -> Task {
+    fn upload(&self, lights: &[LightGeometry], receivers: &[Receiver], bound: Option<&ErrorBound>) -> Task {
         let count = receivers.len() as u32;
         let size = 4 * u64::from(count);
         let lights = self.input("lights", bytemuck::cast_slice(lights));
-        let receivers = self.input("receivers", bytemuck::cast_slice(&receivers));
+        let receivers = self.input("receivers", bytemuck::cast_slice(receivers));
         let results =
             self.buffer("results", size, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
         let back = self.buffer("back", size, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
