@@ -44,6 +44,37 @@ impl<R: Real> Heights<R> {
         }
     }
 
+    /// The same from the nearest of the corners, which knows how high a tip next to the point is; the others' heights are
+    /// rounded to their own distance. Where the two disagree about which corners are above the horizon, the first
+    /// corner's word counts, by which the light came here.
+    #[inline(always)]
+    pub fn from_nearest(light: &LightGeometry, corners: [Vector<R>; 3], n: Vector<R>) -> Self {
+        let [r0, r1, r2] = corners;
+        let from_first = Self::new(light, r0, n);
+        let [rise_01, _, rise_20] = from_first.rises;
+        let (l0, l1, l2) = (r0.dot(r0), r1.dot(r1), r2.dot(r2));
+        let second = l1.below(l0) & l1.up_to(l2);
+        let third = l2.below(l0) & l2.below(l1);
+        let z0 = R::select(third, n.dot(r2) + rise_20, n.dot(r1) - rise_01);
+        let from_nearest = Self {
+            corners: [z0, R::select(second, n.dot(r1), z0 + rise_01), R::select(third, n.dot(r2), z0 - rise_20)],
+            ..from_first
+        };
+        let ([a0, a1, a2], [b0, b1, b2]) = (from_first.above(), from_nearest.above());
+        let agree = ((a0 & b0) | !(a0 | b0)) & ((a1 & b1) | !(a1 | b1)) & ((a2 & b2) | !(a2 | b2));
+        let use_nearest = agree & (second | third);
+        let [y0, y1, y2] = from_first.corners;
+        let [z0, z1, z2] = from_nearest.corners;
+        Self {
+            corners: [
+                R::select(use_nearest, z0, y0),
+                R::select(use_nearest, z1, y1),
+                R::select(use_nearest, z2, y2),
+            ],
+            ..from_first
+        }
+    }
+
     /// Which corners are above the horizon.
     #[inline(always)]
     pub fn above(&self) -> [R::Mask; 3] {

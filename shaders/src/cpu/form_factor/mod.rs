@@ -95,7 +95,7 @@ fn close_whole<R: Real>(light: &LightGeometry, x: Vector<R>, n: Vector<R>) -> R 
 #[inline(always)]
 fn close_clipped<R: Real>(light: &LightGeometry, x: Vector<R>, n: Vector<R>) -> R {
     let corners = corners_from(light, x);
-    let polygon = clip_at_horizon(light, corners, &Heights::new(light, corners[0], n));
+    let polygon = clip_at_horizon(light, corners, &Heights::from_nearest(light, corners, n));
     let sum = polygon_sum(light, &polygon, n);
     to_unit(sum * sum.splat(-FRAC_1_PI))
 }
