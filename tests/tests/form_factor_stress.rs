@@ -1,6 +1,6 @@
 //! The form factor over generated cases of every kind that breaks one, on the CPU and on the GPU, with the same gates.
 //!
-//! `VLM_STRESS_CASES` sets how many; 1e9 takes hours.
+//! `VLM_STRESS_CASES` sets how many; 1e9 takes an hour.
 
 use vlm_tests::form_factor::command::{on_cpu, on_lanes};
 use vlm_tests::form_factor::gpu::GpuFormFactor;

@@ -111,7 +111,7 @@ fn close_whole(light: LightGeometry, x: vec3f, n: vec3f) -> f32 {
 
 fn close_clipped(light: LightGeometry, x: vec3f, n: vec3f) -> f32 {
     let corners = corners_from(light, x);
-    let polygon = clip_at_horizon(light, corners, heights(light, corners[0], n));
+    let polygon = clip_at_horizon(light, corners, heights_from_nearest(light, corners, n));
     return to_unit(polygon_sum(light, polygon, n) * -INVERSE_PI);
 }
 
@@ -178,6 +178,21 @@ fn heights(light: LightGeometry, r: vec3f, n: vec3f) -> Heights {
         vec3f(first, first + to_second, first + to_third),
         vec3f(to_second, along_base, -to_third),
     );
+}
+
+fn heights_from_nearest(light: LightGeometry, corners: array<vec3f, 3>, n: vec3f) -> Heights {
+    let from_first = heights(light, corners[0], n);
+    let l0 = dot(corners[0], corners[0]);
+    let l1 = dot(corners[1], corners[1]);
+    let l2 = dot(corners[2], corners[2]);
+    let second = l1 < l0 && l1 <= l2;
+    let third = l2 < l0 && l2 < l1;
+    let z1 = dot(n, corners[1]);
+    let z2 = dot(n, corners[2]);
+    let z0 = select(z1 - from_first.rises.x, z2 + from_first.rises.z, third);
+    let from_nearest = vec3f(z0, select(z0 + from_first.rises.x, z1, second), select(z0 - from_first.rises.z, z2, third));
+    let agree = all((from_first.corners > vec3f(0.0)) == (from_nearest > vec3f(0.0)));
+    return Heights(select(from_first.corners, from_nearest, agree && (second || third)), from_first.rises);
 }
 
 fn far_triangle(light: LightGeometry, r: vec3f, n: vec3f, n_r: f32, normal_r: f32) -> Sum {

@@ -57,7 +57,11 @@ impl<R: Real> Heights<R> {
         let third = l2.below(l0) & l2.below(l1);
         let z0 = R::select(third, n.dot(r2) + rise_20, n.dot(r1) - rise_01);
         let from_nearest = Self {
-            corners: [z0, R::select(second, n.dot(r1), z0 + rise_01), R::select(third, n.dot(r2), z0 - rise_20)],
+            corners: [
+                z0,
+                R::select(second, n.dot(r1), z0 + rise_01),
+                R::select(third, n.dot(r2), z0 - rise_20),
+            ],
             ..from_first
         };
         let ([a0, a1, a2], [b0, b1, b2]) = (from_first.above(), from_nearest.above());
