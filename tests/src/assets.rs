@@ -6,11 +6,21 @@ use std::path::PathBuf;
 ///
 /// Where it is absent, says so on stderr and returns `None`: the test then returns, and reads "ignored".
 pub fn find(relative: &str) -> Option<PathBuf> {
-    let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/assets");
-    let roots = std::env::var_os("VLM_ASSETS").map(PathBuf::from).into_iter().chain([beside]);
-    let found = roots.map(|root| root.join(relative)).find(|path| path.exists());
+    let found = look(relative);
     if found.is_none() {
         eprintln!("ignored: `{relative}` is neither in VLM_ASSETS nor in ../shared/assets");
     }
     found
+}
+
+/// As [`find`], without a word where it is absent: for programs, which have an error of their own for it.
+#[must_use]
+pub fn look(relative: &str) -> Option<PathBuf> {
+    roots().map(|root| root.join(relative)).find(|path| path.exists())
+}
+
+/// The folders in which assets may be, in the order in which they are asked.
+pub(crate) fn roots() -> impl Iterator<Item = PathBuf> {
+    let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/assets");
+    std::env::var_os("VLM_ASSETS").map(PathBuf::from).into_iter().chain([beside])
 }

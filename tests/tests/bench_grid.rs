@@ -54,7 +54,7 @@ fn a_small_run_writes_rows_a_table_and_figures() {
 #[test]
 fn what_is_wrong_is_said_and_nothing_is_printed() {
     for (args, expected) in [
-        (&["--scenes", "nowhere"][..], "`nowhere`"),
+        (&["--scenes", "nowhere"][..], "`nowhere`: besides `room`, there are "),
         (&["--cells", "0"], "--cells"),
         (&["--lights", "many"], "--lights"),
         (&["--range", "NaN"], "--range"),
@@ -63,6 +63,7 @@ fn what_is_wrong_is_said_and_nothing_is_printed() {
         let done = grid(args);
         assert_eq!(done.status.code(), Some(2));
         let message = String::from_utf8_lossy(&done.stderr);
+        assert!(!message.contains("ignored"), "{message}");
         assert!(message.contains(expected) && done.stdout.is_empty(), "{message}");
     }
 }

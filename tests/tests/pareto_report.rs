@@ -140,6 +140,20 @@ fn without_pictures_there_are_no_sheets_and_the_rest_is_there() {
     assert_eq!(written(folder.path()).len(), 5);
     let summary = fs::read_to_string(folder.path().join("summary.md")).unwrap();
     assert!(!summary.contains("sheet.png"), "{summary}");
+    assert_eq!(summary.matches("Contact sheet not kept.").count(), 2, "{summary}");
+}
+
+#[test]
+fn sheets_outlive_their_pictures_and_only_those_that_are_there_are_shown() {
+    let folder = run_folder();
+    report(folder.path()).unwrap();
+    fs::remove_dir_all(folder.path().join("images")).unwrap();
+    fs::remove_file(folder.path().join("made_up-hall_left_sheet.png")).unwrap();
+    report(folder.path()).unwrap();
+    let summary = fs::read_to_string(folder.path().join("summary.md")).unwrap();
+    assert!(summary.contains("(made_up-hall_far_end_sheet.png)"), "{summary}");
+    assert!(!summary.contains("left_sheet.png"), "{summary}");
+    assert_eq!(summary.matches("Contact sheet not kept.").count(), 1, "{summary}");
 }
 
 #[test]
@@ -169,6 +183,10 @@ fn rows_that_cannot_be_are_named_by_line() {
     assert!(with(&|rows| rows[4].relative_rmse = f64::NAN).contains("line 6: relative_rmse is NaN"));
     assert!(with(&|rows| rows[0].seconds_gather = -1.0).contains("line 2: seconds_gather is -1"));
     assert!(with(&|rows| rows[4] = rows[3].clone()).contains("line 6: the same sample as line 5"));
+    let written = fs::read_to_string(folder.path().join("raw.csv")).unwrap();
+    fs::write(folder.path().join("raw.csv"), written.replacen(",cpu,none,0,", ",cpu,none,many,", 1)).unwrap();
+    let number = complaint(folder.path());
+    assert!(number.contains("line 2: repeat: invalid digit"), "{number}");
     fs::write(folder.path().join("raw.csv"), "scene,camera\na,b\n").unwrap();
     assert!(complaint(folder.path()).contains("raw.csv"));
     fs::write(folder.path().join("raw.csv"), "").unwrap();

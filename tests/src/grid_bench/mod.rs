@@ -23,9 +23,7 @@ use row::Row;
 #[derive(Debug, thiserror::Error)]
 pub enum GridBenchError {
     /// There is no such scene.
-    #[error(
-        "there is no scene `{0}`: name `room`, or one of the repository's `assets` or of the test assets' `scenes`"
-    )]
+    #[error("there is no scene `{0}`: besides `room`, {hint}", hint = crate::pareto::scene::hint())]
     UnknownScene(String),
     /// A scene's file is not readable.
     #[error(transparent)]

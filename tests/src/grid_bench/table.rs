@@ -16,8 +16,9 @@ pub fn summary(rows: &[Row], options: &GridOptions) -> String {
     if let Some(row) = rows.first() {
         text += &format!(
             "{}, {} threads; medians of {} interleaved repeats; a light reaches {} of its radii.\n\
-             `ours` scatters lights into the cells that hold surface, and finds these; `thesis` tests every cell against every \
-             light, with lists of {}. \
+             Cells are counted along the longest axis; `ours` are cubes, `thesis` divides every axis alike.\n\
+             `ours` scatters lights into the cells that hold surface, and finds these; `thesis` tests every cell against \
+             every light, with lists of {}. \
              Both on this processor. For scale: Aquotte 2017, table 5.2, needs 12.5 s for 100^3 cells and 100,000 \
              lights on a graphics card.\n",
             row.device,
@@ -62,13 +63,16 @@ fn scene_tables(scene: &str, rows: &[Row], limit: f64) -> String {
         grouped(rows.first().map_or(0, |row| row.triangles))
     );
     let header = |first: &str| -> Vec<String> {
-        std::iter::once(first.to_owned()).chain(cells.iter().map(|c| format!("{c}^3 cells"))).collect()
+        std::iter::once(first.to_owned()).chain(cells.iter().map(|c| format!("{c} per axis"))).collect()
     };
     let times = lights.iter().map(|&l| {
         let cell = |&c: &u32| times(rows, l, c);
         std::iter::once(grouped(l)).chain(cells.iter().map(cell)).collect()
     });
-    text += &table(&header("lights: ours, thesis (ratio)"), &times.collect::<Vec<_>>());
+    let counts =
+        std::iter::once("cells: ours; thesis".to_owned()).chain(cells.iter().map(|&c| counts(rows, c)));
+    let lines: Vec<Vec<String>> = std::iter::once(counts.collect()).chain(times).collect();
+    text += &table(&header("lights: ours, thesis (ratio)"), &lines);
     if rows.iter().any(|row| seconds(rows, THESIS, row.lights, row.cells_per_axis).is_none()) {
         text += &format!(
             "\n*not run*: at its speed in this run, tests a second, the thesis' build would take longer than {} s.\n",
@@ -90,6 +94,20 @@ fn scene_tables(scene: &str, rows: &[Row], limit: f64) -> String {
 
 fn slope(points: impl Iterator<Item = (f64, f64)>) -> String {
     exponent(points).map_or_else(|| "-".to_owned(), |p| format!("{p:.2}"))
+}
+
+/// Cells of both builds' boxes: ours are cubes, and so fewer along the shorter axes.
+fn counts(rows: &[Row], cells: u32) -> String {
+    let of = |builder: &str| {
+        let of_builder = rows.iter().filter(|row| row.builder == builder && row.cells_per_axis == cells);
+        let found: BTreeSet<u64> = of_builder.map(|row| row.cells).collect();
+        match (found.first(), found.last()) {
+            (Some(least), Some(most)) if least < most => format!("{} to {}", grouped(*least), grouped(*most)),
+            (Some(count), _) => grouped(*count),
+            _ => "*not run*".to_owned(),
+        }
+    };
+    format!("{}; {}", of(OURS), of(THESIS))
 }
 
 /// Time of one build over its repeats.
@@ -126,7 +144,17 @@ fn spread_line(rows: &[Row]) -> String {
 }
 
 fn stored(rows: &[Row], lights: &BTreeSet<u64>, cells: &BTreeSet<u32>) -> String {
-    let header = ["lights", "cells", "build", "stored cells", "entries", "a stored cell", "dropped", "bytes"];
+    let header = [
+        "lights",
+        "per axis",
+        "build",
+        "cells",
+        "stored cells",
+        "entries",
+        "a stored cell",
+        "dropped",
+        "bytes",
+    ];
     let mut lines = Vec::new();
     for (&l, &c) in lights.iter().flat_map(|l| cells.iter().map(move |c| (l, c))) {
         for builder in [OURS, THESIS] {
@@ -142,8 +170,9 @@ fn stored(rows: &[Row], lights: &BTreeSet<u64>, cells: &BTreeSet<u32>) -> String
 fn stored_line(row: &Row) -> Vec<String> {
     vec![
         grouped(row.lights),
-        format!("{}^3", row.cells_per_axis),
+        row.cells_per_axis.to_string(),
         row.builder.clone(),
+        grouped(row.cells),
         grouped(row.stored_cells),
         grouped(row.entries),
         short(row.entries as f64 / row.stored_cells.max(1) as f64),
@@ -175,7 +204,8 @@ pub(super) mod tests {
                     builder: builder.to_owned(),
                     repeat,
                     seconds: seconds * factor,
-                    cells: u64::from(cells).pow(3),
+                    // A room half as high as wide, where cells are cubes.
+                    cells: u64::from(cells).pow(3) / if builder == OURS { 2 } else { 1 },
                     stored_cells: 500,
                     entries: 40 * lights,
                     bytes: 1_500_000,
@@ -196,7 +226,8 @@ pub(super) mod tests {
             "| 10,000 | 20.0 ms, 164 ms (8.19 x) | 20.0 ms, *not run* |",
             "| ours | 1.00 | 1.00 |",
             "| thesis | 1.00 | - |",
-            "| 1,000 | 16^3 | ours | 500 | 40,000 | 80.0 | 0 | 1.5 MB |",
+            "| cells: ours; thesis | 2,048; 4,096 | 16,384; 32,768 |",
+            "| 1,000 | 16 | ours | 2,048 | 500 | 40,000 | 80.0 | 0 | 1.5 MB |",
             "longer than 20.0 s",
             "1.22 in the median, 1.22 at worst",
             "medians of 3 interleaved repeats",

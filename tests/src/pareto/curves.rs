@@ -4,9 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::front::{Sample, front, front_samples};
 use super::row::Row;
+use crate::plot::SERIES;
 
 /// The method that all ratios are relative to.
 pub const YARDSTICK: &str = "thesis";
+
+/// Methods in the order of their series numbers: a run of fewer methods keeps every method's colour and marker.
+const NUMBERED: [&str; 6] = [YARDSTICK, OURS, "brute", "ddgi", "instant_radiosity", "direct"];
 
 /// A median with the least and greatest value that it stands for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -41,7 +45,7 @@ impl Spread {
 pub struct Setting {
     /// `key=value` pairs.
     pub knob: String,
-    /// Per repeat, geometric means over the cameras.
+    /// Per repeat, means over the cameras: quadratic of the errors, arithmetic of the times.
     pub repeats: BTreeMap<u32, Sample>,
     /// Time of a frame over the repeats.
     pub seconds: Spread,
@@ -58,7 +62,7 @@ pub struct Setting {
 pub struct MethodCurve {
     /// The method's name, with its backend where that is not the processor.
     pub name: String,
-    /// Its number in the whole run, for its colour.
+    /// Its number for its colour: known methods have the same one in every run.
     pub series: usize,
     /// By median time.
     pub settings: Vec<Setting>,
@@ -146,12 +150,21 @@ pub fn scene_curves(rows: &[Row]) -> Vec<SceneCurves> {
     scenes.into_iter().map(|scene| one_scene(rows, scene, &all_methods)).collect()
 }
 
+/// The series number of each method. Unknown ones take the numbers after the known ones, then those of known methods that
+/// the run lacks, so that colours repeat only where there are more methods than colours.
+fn series_numbers(methods: &[String]) -> Vec<usize> {
+    let known = |name: &String| NUMBERED.iter().position(|numbered| numbered == name);
+    let lacking = |&number: &usize| !methods.iter().any(|name| known(name) == Some(number));
+    let mut free = (NUMBERED.len()..SERIES).chain((0..NUMBERED.len()).filter(lacking)).chain(SERIES..);
+    methods.iter().map(|name| known(name).or_else(|| free.next()).unwrap_or_default()).collect()
+}
+
 fn one_scene(rows: &[Row], scene: String, all_methods: &[String]) -> SceneCurves {
     let rows: Vec<&Row> = rows.iter().filter(|row| row.scene == scene).collect();
     let cameras = distinct(rows.iter().map(|row| row.camera.as_str()));
     let mut incomplete = Vec::new();
     let mut methods = Vec::new();
-    for (series, name) in all_methods.iter().enumerate() {
+    for (series, name) in series_numbers(all_methods).into_iter().zip(all_methods) {
         let mut by_knob: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
         for row in rows.iter().filter(|row| method_name(row) == *name) {
             by_knob.entry(&row.knob).or_default().push(row);
@@ -178,12 +191,12 @@ fn setting(knob: &str, rows: &[&Row], cameras: usize) -> Option<Setting> {
     }
     by_repeat.retain(|_, rows| rows.len() == cameras);
     let sample = |rows: &Vec<&Row>| Sample {
-        seconds: geometric_mean(rows.iter().map(|row| row.frame_seconds())),
-        error: geometric_mean(rows.iter().map(|row| row.relative_rmse)),
+        seconds: mean(rows.iter().map(|row| row.frame_seconds())),
+        error: quadratic_mean(rows.iter().map(|row| row.relative_rmse)),
         suffices: rows.iter().all(|row| row.truth_suffices),
     };
     let algorithm = |rows: &Vec<&Row>| -> Option<f64> {
-        Some(geometric_mean(
+        Some(quadratic_mean(
             rows.iter().map(|row| row.algorithm_rmse).collect::<Option<Vec<f64>>>()?.into_iter(),
         ))
     };
@@ -199,10 +212,18 @@ fn setting(knob: &str, rows: &[&Row], cameras: usize) -> Option<Setting> {
     })
 }
 
-/// Ratios between methods stay the same whichever camera is cheap or dark, which no other mean gives.
-fn geometric_mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+/// As if the cameras' frames were shown one after another.
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     let count = values.len() as f64;
-    if count == 1.0 { values.sum() } else { (values.map(f64::ln).sum::<f64>() / count).exp() }
+    values.sum::<f64>() / count
+}
+
+/// Root of the mean of squares, as over the pixels of one picture: a camera in which a method fails stays visible, where
+/// a geometric mean would let a good camera hide it.
+fn quadratic_mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len();
+    // One value stays as it is, not rounded.
+    if count == 1 { values.sum() } else { mean(values.map(|value| value * value)).sqrt() }
 }
 
 #[cfg(test)]
@@ -233,7 +254,28 @@ mod tests {
     }
 
     #[test]
-    fn cameras_weigh_by_ratio_and_must_all_be_there() {
+    fn colours_do_not_depend_on_what_else_ran() {
+        let numbers =
+            |names: &[&str]| series_numbers(&names.iter().map(|&n| n.to_owned()).collect::<Vec<_>>());
+        assert_eq!(
+            numbers(&["thesis", "vlm", "brute", "ddgi", "instant_radiosity", "direct"]),
+            [0, 1, 2, 3, 4, 5]
+        );
+        assert_eq!(numbers(&["direct", "vlm"]), [5, 1]);
+        assert_eq!(numbers(&["vlm", "a", "b", "c", "d"]), [1, 6, 7, 0, 2], "unknown ones take what is free");
+    }
+
+    #[test]
+    fn a_camera_that_fails_is_not_hidden() {
+        let rows =
+            [row("a", "front", "brute", "", 0, 1.0, 8.37), row("a", "back", "brute", "", 0, 3.0, 0.041)];
+        let setting = &scene_curves(&rows)[0].methods[0].settings[0];
+        assert!((setting.error.median - 5.919).abs() < 1e-3, "not 0.586, the geometric mean");
+        assert_eq!(setting.seconds.median, 2.0);
+    }
+
+    #[test]
+    fn cameras_count_equally_and_must_all_be_there() {
         let rows = [
             row("a", "left", "vlm", "n=1", 0, 1.0, 0.1),
             row("a", "right", "vlm", "n=1", 0, 4.0, 0.4),
@@ -243,8 +285,8 @@ mod tests {
         let scene = &scene_curves(&rows)[0];
         let settings = &scene.methods[0].settings;
         assert_eq!((settings.len(), settings[0].repeats.len()), (1, 1), "repeat 1 lacks a camera");
-        assert!((settings[0].seconds.median - 2.0).abs() < 1e-12);
-        assert!((settings[0].error.median - 0.2).abs() < 1e-12);
+        assert!((settings[0].seconds.median - 2.5).abs() < 1e-12);
+        assert!((settings[0].error.median - 0.085f64.sqrt()).abs() < 1e-12);
         assert_eq!(scene.incomplete, ["vlm n=2"]);
     }
 

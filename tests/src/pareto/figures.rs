@@ -1,4 +1,4 @@
-//! A scene's figures: error against time, and the error split into algorithm and model.
+//! A scene's figures: error against time, and the error against the truth beside that of the algorithm.
 
 use std::path::Path;
 
@@ -27,7 +27,7 @@ fn conditions(scene: &SceneCurves, rows: &[Row]) -> String {
     let Some(row) = rows.iter().find(|row| row.scene == scene.scene) else { return String::new() };
     let cameras = match scene.cameras.as_slice() {
         [one] => one.clone(),
-        several => format!("{} cameras (geometric mean)", several.len()),
+        several => format!("{} cameras (quadratic mean of errors, mean of times)", several.len()),
     };
     format!("{} x {} pixels, {cameras}, {}", row.width, row.height, row.device)
 }
@@ -112,7 +112,7 @@ fn split(scene: &SceneCurves, conditions: &str) -> Figure {
     let mut curves = Vec::new();
     for method in &scene.methods {
         let front = method.front();
-        let model = format!("{}: model", method.name);
+        let model = format!("{}: against the truth", method.name);
         if takes_time(method) {
             let points = front.iter().map(|setting| point(setting, &setting.error)).collect();
             curves.push(Curve::new(&model, method.series, points));
@@ -122,9 +122,10 @@ fn split(scene: &SceneCurves, conditions: &str) -> Figure {
         curves.extend(algorithm(method, &front, floor));
     }
     Figure {
-        title: format!("{}: error of the algorithm and of the model", scene.scene),
+        title: format!("{}: error against the truth, and of the algorithm", scene.scene),
         subtitle: format!(
-            "{conditions}\nModel: against the truth; algorithm: against the exact sum over the same lights"
+            "{conditions}\nAlgorithm: against the exact sum over the same lights, without occlusion; its error and the \
+             missing occlusion can cancel"
         ),
         x: Axis::log(TIME),
         y: Axis::log("relative RMSE"),
@@ -173,7 +174,7 @@ mod tests {
         let of_vlm: Vec<(&str, usize, bool)> = figure
             .curves
             .iter()
-            .filter(|curve| curve.series == 0)
+            .filter(|curve| curve.series == 1)
             .map(|curve| (curve.name.as_str(), curve.points.len(), curve.faint))
             .collect();
         assert_eq!(of_vlm, [("", 3, true), ("vlm", 2, false)], "setting c is no faster and no better than b");
@@ -196,14 +197,17 @@ mod tests {
         };
         assert_eq!(hollow(&rows), [0; 0]);
         rows[0].truth_suffices = false;
-        assert_eq!(hollow(&rows), [1]);
+        assert_eq!(hollow(&rows), [2]);
     }
 
     #[test]
     fn the_split_shows_the_algorithm_where_there_is_one() {
         let figure = split(&scene(), "");
         let names: Vec<&str> = figure.curves.iter().map(|curve| curve.name.as_str()).collect();
-        assert_eq!(names, ["vlm: model", "vlm: algorithm, or < 0.00200", "direct: model"]);
+        assert_eq!(
+            names,
+            ["vlm: against the truth", "vlm: algorithm, or < 0.00200", "direct: against the truth"]
+        );
         assert_eq!(figure.curves[1].points, [Point::new(0.01, 0.05)], "rounding lies below the figure");
     }
 

@@ -1,6 +1,6 @@
 //! From a run's folder to what people read: `raw.csv` becomes `summary.md`, figures and contact sheets.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use glam::Vec3;
@@ -42,7 +42,7 @@ pub enum ReportError {
         reason: String,
     },
     /// A picture is missing, or is none.
-    #[error("{path}: {source}: repeat the run, or remove its folder `images` to report without contact sheets", path = path.display())]
+    #[error("{path}: {source}: repeat the run, or remove its folder `images` to keep the contact sheets as they are", path = path.display())]
     Picture {
         /// The file.
         path: PathBuf,
@@ -68,25 +68,30 @@ pub enum ReportError {
 }
 
 /// Reads `raw.csv` and `images/` in a run's folder, and writes `summary.md`, `SCENE_pareto` and `SCENE_split` (SVG, PNG)
-/// and `SCENE_CAMERA_sheet.png` beside them. A folder without `images` gets no contact sheets.
+/// and `SCENE_CAMERA_sheet.png` beside them. A folder without `images` keeps the contact sheets that it has.
 ///
 /// # Errors
 /// [`ReportError`], which names the file and the remedy. What was written before stays.
 pub fn report(dir: &Path) -> Result<(), ReportError> {
     let rows = read_rows(&dir.join("raw.csv"))?;
-    let sheets = dir.join("images").is_dir();
+    let pictures = dir.join("images").is_dir();
+    let mut sheets = BTreeSet::new();
     for scene in scene_curves(&rows) {
         figures::write(dir, &scene, &rows)?;
         for camera in &scene.cameras {
             let seen: Vec<&Row> =
                 rows.iter().filter(|r| r.scene == scene.scene && r.camera == *camera).collect();
-            if sheets {
-                sheet(dir, &scene.scene, camera, &seen)?
-                    .write(&dir.join(sheet_file(&scene.scene, camera)))?;
+            let file = sheet_file(&scene.scene, camera);
+            let path = dir.join(&file);
+            if pictures {
+                sheet(dir, &scene.scene, camera, &seen)?.write(&path)?;
+            }
+            if path.is_file() {
+                sheets.insert(file);
             }
         }
     }
-    vlm_format::write_file(&dir.join("summary.md"), summary::summary(&rows, sheets).as_bytes())?;
+    vlm_format::write_file(&dir.join("summary.md"), summary::summary(&rows, &sheets).as_bytes())?;
     Ok(())
 }
 
@@ -97,7 +102,9 @@ pub fn report(dir: &Path) -> Result<(), ReportError> {
 pub fn read_rows(path: &Path) -> Result<Vec<Row>, ReportError> {
     let failed = |source| ReportError::Csv { path: path.to_owned(), source };
     let mut reader = csv::Reader::from_path(path).map_err(failed)?;
-    let rows: Vec<Row> = reader.deserialize().collect::<Result<_, _>>().map_err(failed)?;
+    let header = reader.headers().map_err(failed)?.clone();
+    let rows: Vec<Row> =
+        reader.deserialize().collect::<Result<_, _>>().map_err(|error| unreadable(path, &header, error))?;
     if rows.is_empty() {
         return Err(ReportError::Empty { path: path.to_owned() });
     }
@@ -113,6 +120,21 @@ pub fn read_rows(path: &Path) -> Result<Vec<Row>, ReportError> {
         }
     }
     Ok(rows)
+}
+
+/// Names the column instead of its number, where the fault is in one.
+fn unreadable(path: &Path, header: &csv::StringRecord, source: csv::Error) -> ReportError {
+    if let csv::ErrorKind::Deserialize { pos: Some(pos), err } = source.kind() {
+        let column = err.field().and_then(|field| header.get(usize::try_from(field).ok()?));
+        if let (Some(column), Ok(line)) = (column, usize::try_from(pos.line())) {
+            return ReportError::Row {
+                path: path.to_owned(),
+                line,
+                reason: format!("{column}: {}", err.kind()),
+            };
+        }
+    }
+    ReportError::Csv { path: path.to_owned(), source }
 }
 
 /// What no measurement can be, among what figures and tables rest on.

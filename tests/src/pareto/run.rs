@@ -50,9 +50,7 @@ pub struct Outcome {
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// There is no such scene.
-    #[error(
-        "there is no scene `{0}`: name one of the repository's `assets` or of the test assets' `scenes`, without `.glb`"
-    )]
+    #[error("there is no scene `{0}`: {hint}", hint = scene::hint())]
     UnknownScene(String),
     /// There is no such method.
     #[error("there is no method `{wanted}`: name some of {known}")]
@@ -102,6 +100,14 @@ pub enum RunError {
     /// `raw.csv` cannot be written.
     #[error("raw.csv: {0}")]
     Csv(#[from] csv::Error),
+    /// A folder cannot be made.
+    #[error("cannot create the folder {path}: {source}; name a folder that can be written", path = path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
     /// A file or folder cannot be written or read.
     #[error("{path}: {source}", path = path.display())]
     Io {
@@ -123,12 +129,13 @@ pub fn run(options: &RunOptions, log: &dyn Fn(&str)) -> Result<Outcome, RunError
         .iter()
         .map(|name| scene::file(name).ok_or_else(|| RunError::UnknownScene(name.clone())));
     let files: Vec<PathBuf> = files.collect::<Result<_, _>>()?;
+    // Before the proofs, which take a while.
+    create_folder(&options.out)?;
     let mut outcome = Outcome::default();
     let entries = proven(entries, &mut outcome.refused, log);
     if entries.is_empty() {
         return Err(RunError::NoMethods);
     }
-    create_folder(&options.out)?;
     for (name, file) in options.scenes.iter().zip(&files) {
         outcome.rows.extend(run_scene(options, name, file, &entries, log)?);
         write_rows(&options.out, &outcome.rows)?;
@@ -140,7 +147,8 @@ fn chosen(names: Option<&[String]>) -> Result<Vec<&'static Entry>, RunError> {
     let Some(names) = names else { return Ok(ALL.iter().collect()) };
     let find = |name: &String| {
         let known = || ALL.map(|entry| entry.name).join(", ");
-        let found = ALL.iter().find(|entry| entry.name == name);
+        // `vlm-bench render` and the rows spell names differently.
+        let found = ALL.iter().find(|entry| entry.name == name.replace('-', "_"));
         found.ok_or_else(|| RunError::UnknownMethod { wanted: name.clone(), known: known() })
     };
     names.iter().map(find).collect()
@@ -260,12 +268,21 @@ fn write_rows(folder: &Path, rows: &[Row]) -> Result<(), RunError> {
 }
 
 pub(super) fn create_folder(path: &Path) -> Result<(), RunError> {
-    fs::create_dir_all(path).map_err(|source| RunError::Io { path: path.to_owned(), source })
+    fs::create_dir_all(path).map_err(|source| RunError::Folder { path: path.to_owned(), source })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn methods_are_known_by_either_spelling() {
+        let of = |name: &str| chosen(Some(&[name.to_owned()])).map(|entries| entries[0].name);
+        for name in ["instant_radiosity", "instant-radiosity"] {
+            assert_eq!(of(name).unwrap(), "instant_radiosity");
+        }
+        assert!(of("magic").unwrap_err().to_string().contains("instant_radiosity"));
+    }
 
     #[test]
     fn every_repeat_runs_everything_once_in_an_order_of_its_own() {

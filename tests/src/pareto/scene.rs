@@ -1,5 +1,6 @@
 //! The scenes of a run by name.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use crate::assets;
@@ -18,7 +19,7 @@ pub fn file(name: &str) -> Option<PathBuf> {
         return Some(own);
     }
     let full_name = if name == "dungeon" { "dungeon_kaykit" } else { name };
-    assets::find(&format!("scenes/{full_name}.glb"))
+    assets::look(&format!("scenes/{full_name}.glb"))
 }
 
 /// The size of its pictures unless the user names one.
@@ -27,6 +28,46 @@ pub fn default_size(name: &str) -> (u32, u32) {
     if own_file(name).exists() { ROOM_SIZE } else { HALL_SIZE }
 }
 
+fn own_folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets")
+}
+
 fn own_file(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets").join(format!("{name}.glb"))
+    own_folder().join(format!("{name}.glb"))
+}
+
+/// The names of all scenes that [`file()`] finds now, sorted.
+#[must_use]
+pub fn known() -> Vec<String> {
+    let folders = assets::roots().map(|root| root.join("scenes")).chain([own_folder()]);
+    // A folder that is not there or not readable has no scenes.
+    let entries = folders.filter_map(|folder| std::fs::read_dir(folder).ok()).flatten().flatten();
+    let names = entries.filter_map(|entry| {
+        let path = entry.path();
+        let is_scene = path.extension().is_some_and(|extension| extension == "glb");
+        is_scene.then(|| path.file_stem().map(|stem| stem.to_string_lossy().into_owned()))?
+    });
+    names.collect::<BTreeSet<_>>().into_iter().collect()
+}
+
+/// What a message about a scene that is not there should add.
+pub(crate) fn hint() -> String {
+    format!(
+        "there are {}; the environment variable VLM_ASSETS names the folder whose `scenes` holds more",
+        known().join(", ")
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn known_scenes_are_found() {
+        let known = known();
+        assert!(known.iter().any(|name| name == "cornell"), "{known:?}");
+        assert!(known.iter().all(|name| file(name).is_some()), "{known:?}");
+        assert_eq!(file("nowhere"), None);
+        assert!(hint().contains("cornell") && hint().contains("VLM_ASSETS"));
+    }
 }

@@ -1,6 +1,6 @@
 //! `summary.md`: what a run found, in tables.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use super::curves::{SceneCurves, Spread, YARDSTICK, distinct, method_name, method_order, scene_curves};
@@ -9,10 +9,27 @@ use super::names::{file_name, sheet_file};
 use super::numbers::{range, short, time};
 use super::row::Row;
 
-/// The summary of a run's rows, in Markdown; `sheets` says that contact sheets lie beside it. The same rows give the same
-/// text.
+/// What the columns of a camera's table hold.
+const COLUMNS: &str = "Columns of the tables by camera:
+- front: * marks settings on the method's Pareto front, from the means over the scene's cameras.
+- pairs: a pixel with a light or probe; rays: of a frame; bytes: what the method keeps beside the scene.
+- prepare: once per scene (bake, grid, probe placement), not in the frame's time.
+- inject: light arrives at lights or probes, per frame.
+- gather: indirect light of every pixel, per frame.
+- algorithm: relative RMSE against the exact sum over the same lights, without occlusion; – where there are no area lights.
+  The algorithm's error and the missing occlusion can cancel: an error against the truth below the exact sum's is chance.
+- relMSE: mean of squared error over squared truth, so that dark pixels count as much as bright ones.
+- FLIP: mean visible difference of the shown pictures, 0 to 1.
+- energy: sum over the truth's sum, less 1; above 0 is too bright.
+- p99: 99th percentile of the luminance's error, over the truth's mean.
+- jump: largest difference of the error between neighbouring pixels, over the truth's mean: an edge that should not be.
+- frame change: RMS of the change between two frames of a still scene, over the truth's RMS: flicker.
+- †: the truth's own noise is above a third of this error, which is then an upper bound.
+";
+
+/// The summary of a run's rows, in Markdown; `sheets` names the contact sheets beside it. The same rows give the same text.
 #[must_use]
-pub fn summary(rows: &[Row], sheets: bool) -> String {
+pub fn summary(rows: &[Row], sheets: &BTreeSet<String>) -> String {
     let mut text = introduction(rows);
     for scene in scene_curves(rows) {
         let rows: Vec<&Row> = rows.iter().filter(|row| row.scene == scene.scene).collect();
@@ -32,19 +49,20 @@ fn introduction(rows: &[Row]) -> String {
          Errors are relative RMSE of the indirect irradiance against the path-traced truth, unless a column says\n\
          otherwise. Values are medians over the repeats, with the least and the greatest.\n\n\
          Equal time and equal error: every repeat's Pareto front, straight between its settings in log-log, over the\n\
-         front of `{YARDSTICK}` in the same repeat; below 1 is better. Scenes with several cameras: geometric means.\n\n\
-         † The truth's own noise is above a third of this error: the error is an upper bound.\n",
+         front of `{YARDSTICK}` in the same repeat; below 1 is better. Scenes with several cameras: quadratic\n\
+         means of the errors, arithmetic means of the times.\n\n\
+         {COLUMNS}",
         repeats.len(),
         rows.len(),
     )
 }
 
-fn scene_section(scene: &SceneCurves, rows: &[&Row], sheets: bool) -> String {
+fn scene_section(scene: &SceneCurves, rows: &[&Row], sheets: &BTreeSet<String>) -> String {
     let name = &scene.scene;
     let file = file_name(name);
     let mut text = format!(
         "\n## {name}\n\n![{name}: error against time]({file}_pareto.svg)\n\n\
-         ![{name}: algorithm and model error]({file}_split.svg)\n\n\
+         ![{name}: error against the truth, and of the algorithm]({file}_split.svg)\n\n\
          ### {name} at equal time\n\n{}\n### {name} at equal error\n\n{}",
         table(Equal::Time, scene),
         table(Equal::Error, scene),
@@ -60,7 +78,7 @@ fn scene_section(scene: &SceneCurves, rows: &[&Row], sheets: bool) -> String {
 }
 
 /// Every setting of every method as one camera sees it.
-fn camera_section(scene: &SceneCurves, camera: &str, rows: &[&Row], sheets: bool) -> String {
+fn camera_section(scene: &SceneCurves, camera: &str, rows: &[&Row], sheets: &BTreeSet<String>) -> String {
     let size =
         rows.first().map_or_else(String::new, |row| format!("{} x {} pixels. ", row.width, row.height));
     let spp = distinct(
@@ -68,13 +86,14 @@ fn camera_section(scene: &SceneCurves, camera: &str, rows: &[&Row], sheets: bool
     );
     let noise = Spread::of(rows.iter().map(|row| row.truth_noise)).unwrap_or_default();
     let noise = if noise.low == noise.high { short(noise.low) } else { range(&noise, short) };
-    let sheet = if sheets {
-        format!("![{} from {camera}: every method]({})\n\n", scene.scene, sheet_file(&scene.scene, camera))
+    let file = sheet_file(&scene.scene, camera);
+    let sheet = if sheets.contains(&file) {
+        format!("![{} from {camera}: every method]({file})", scene.scene)
     } else {
-        String::new()
+        "Contact sheet not kept.".to_owned()
     };
     let mut text = format!(
-        "\n### {} from {camera}\n\n{sheet}{size}Truth: {} directions per pixel, noise {noise} (relative RMSE).\n\n\
+        "\n### {} from {camera}\n\n{sheet}\n\n{size}Truth: {} directions per pixel, noise {noise} (relative RMSE).\n\n\
          | method | setting | front | lights | pairs | rays | bytes | prepare | inject | gather | frame \
          | least .. greatest | relative RMSE | least .. greatest | algorithm | relMSE | FLIP | energy | p99 | jump \
          | frame change |\n|---|---|---|{}\n",
@@ -149,7 +168,7 @@ mod tests {
 
     #[test]
     fn settings_have_medians_their_spread_and_a_place_on_the_front() {
-        let text = summary(&rows(), false);
+        let text = summary(&rows(), &BTreeSet::new());
         let best = line(&text, "| vlm | lights=464 | * |");
         assert!(
             best.contains(
@@ -163,7 +182,7 @@ mod tests {
 
     #[test]
     fn columns_match_their_header() {
-        let text = summary(&rows(), false);
+        let text = summary(&rows(), &BTreeSet::new());
         for table in text.split("\n\n").filter(|part| part.starts_with('|')) {
             let columns: Vec<usize> = table.lines().map(|line| line.matches('|').count()).collect();
             assert!(columns.windows(2).all(|pair| pair[0] == pair[1]), "{table}");
@@ -174,22 +193,22 @@ mod tests {
     fn the_order_of_the_rows_within_a_scene_does_not_matter() {
         let mut other = rows();
         other.reverse();
-        assert_eq!(summary(&rows(), false), summary(&other, false));
+        assert_eq!(summary(&rows(), &BTreeSet::new()), summary(&other, &BTreeSet::new()));
     }
 
     #[test]
     fn doubtful_rows_are_marked_where_they_stand() {
         let mut rows = rows();
-        let marks = |rows: &[Row]| summary(rows, false).matches('†').count();
+        let marks = |rows: &[Row]| summary(rows, &BTreeSet::new()).matches('†').count();
         assert_eq!(marks(&rows), 1, "the explanation");
         rows[1].truth_suffices = false;
-        assert!(line(&summary(&rows, false), "| vlm | lights=116 |").contains("0.300 †"));
-        assert!(!line(&summary(&rows, false), "| vlm | lights=464 |").contains('†'));
+        assert!(line(&summary(&rows, &BTreeSet::new()), "| vlm | lights=116 |").contains("0.300 †"));
+        assert!(!line(&summary(&rows, &BTreeSet::new()), "| vlm | lights=464 |").contains('†'));
     }
 
     #[test]
     fn equal_time_and_equal_error_are_compared() {
-        let text = summary(&rows(), false);
+        let text = summary(&rows(), &BTreeSet::new());
         assert!(text.contains("### box at equal time") && text.contains("### box at equal error"));
         assert!(text.contains("| thesis | not reached | – |"), "{text}");
         assert!(

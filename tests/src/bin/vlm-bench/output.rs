@@ -8,5 +8,8 @@ use std::path::Path;
 /// # Errors
 /// The folder and the system's reason.
 pub fn make_folder(folder: &Path) -> Result<(), Box<dyn Error>> {
-    std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()).into())
+    std::fs::create_dir_all(folder).map_err(|error| {
+        let folder = folder.display();
+        format!("cannot create the folder {folder}: {error}; name a folder that can be written").into()
+    })
 }

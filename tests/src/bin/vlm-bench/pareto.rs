@@ -24,17 +24,21 @@ pub struct ParetoArgs {
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<(u32, u32)>,
     /// Times that everything is rendered, 2 or more
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(2..))]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = two_or_more)]
     repeats: u32,
     /// Methods, separated by commas [default: all]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     methods: Option<Vec<String>>,
-    /// Folder in which truths are kept
-    #[arg(long, value_name = "DIR", default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/../target/truth"))]
+    /// Folder in which truths are kept; relative to the current folder
+    #[arg(long, value_name = "DIR", default_value = "target/truth")]
     cache: PathBuf,
     /// The most directions per pixel of the truth
-    #[arg(long, value_name = "N", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(2..))]
+    #[arg(long, value_name = "N", default_value_t = 4096, value_parser = two_or_more)]
     spp: u32,
+}
+
+fn two_or_more(text: &str) -> Result<u32, String> {
+    text.parse().ok().filter(|number| *number >= 2).ok_or_else(|| "expected 2 or more".to_owned())
 }
 
 /// Runs the command: 1 if a method failed its proof.

@@ -82,6 +82,7 @@ enum MethodArg {
     /// Aquotte 2017: active hemispheres, lists of fixed size, the textbook formula in single precision
     Thesis,
     /// Keller 1997: virtual point lights with shadow rays, clamped
+    #[value(alias = "instant_radiosity")]
     InstantRadiosity,
     /// Probes as in Majercik et al. 2019: octahedral irradiance and depth moments
     Ddgi,
