@@ -33,15 +33,20 @@ fn no_built_in_inverse_trigonometry() {
     }
 }
 
+/// Names and offsets of a shader's `LightGeometry`, and its size.
+fn layout(source: &str) -> (Vec<(String, usize)>, usize) {
+    let module = parse(source).unwrap_or_else(|error| panic!("{error}"));
+    let (_, light) =
+        module.types.iter().find(|(_, t)| t.name.as_deref() == Some("LightGeometry")).expect("the struct");
+    let naga::TypeInner::Struct { members, span } = &light.inner else { panic!("not a struct") };
+    let member = |m: &naga::StructMember| (m.name.clone().unwrap_or_default(), m.offset as usize);
+    (members.iter().map(member).collect(), *span as usize)
+}
+
 #[test]
 fn light_geometry_has_the_layout_of_its_mirror() {
-    let module = parse(&wgsl::form_factor_cases()).unwrap_or_else(|error| panic!("{error}"));
-    let (_, light) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some("LightGeometry")).unwrap();
-    let naga::TypeInner::Struct { members, span } = &light.inner else { panic!("not a struct") };
-    let found: Vec<_> =
-        members.iter().map(|m| (m.name.as_deref().unwrap_or(""), m.offset as usize)).collect();
     macro_rules! offsets {
-        ($($field:ident),*) => { [$((stringify!($field), offset_of!(LightGeometry, $field))),*] };
+        ($($field:ident),*) => { vec![$((stringify!($field).to_owned(), offset_of!(LightGeometry, $field))),*] };
     }
     let expected = offsets!(
         v0,
@@ -57,6 +62,17 @@ fn light_geometry_has_the_layout_of_its_mirror() {
         v2,
         padding
     );
-    assert_eq!(found, expected);
-    assert_eq!(*span as usize, size_of::<LightGeometry>());
+    assert_eq!(layout(&wgsl::form_factor_cases()), (expected, size_of::<LightGeometry>()));
+}
+
+#[test]
+fn a_rename_a_swap_and_a_dropped_field_are_seen() {
+    let source = "struct LightGeometry { v0: vec3f, scale: f32, base: vec3f, before: f32 }
+        @group(0) @binding(0) var<uniform> light: LightGeometry;";
+    let right = layout(source);
+    for (from, to) in
+        [("scale", "scales"), ("v0: vec3f, scale: f32", "scale: f32, v0: vec3f"), (", before: f32", "")]
+    {
+        assert_ne!(layout(&source.replace(from, to)), right, "{from} -> {to}");
+    }
 }

@@ -1,15 +1,5 @@
-// One form factor per case: a light and a receiver each. Appended to shared/form_factor.wgsl.
+// One form factor per case: a light and a receiver each. Appended to shared/form_factor.wgsl and shared/receivers.wgsl.
 
-struct Receiver {
-    x: vec3f,
-    n_x: f32,
-    n_yz: vec2f,
-    padding: vec2f,
-}
-
-@group(0) @binding(0) var<storage, read> lights: array<LightGeometry>;
-@group(0) @binding(1) var<storage, read> receivers: array<Receiver>;
-@group(0) @binding(2) var<storage, read_write> results: array<f32>;
 // Zero for the exact form alone.
 @group(0) @binding(3) var<storage, read> bound: ErrorBound;
 
@@ -20,7 +10,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let x = receivers[i].x;
-    let n = vec3f(receivers[i].n_x, receivers[i].n_yz);
+    let n = receiver_normal(i);
     if bound.second_moment > 0.0 {
         results[i] = form_factor_within(lights[i], x, n, bound);
     } else {

@@ -219,3 +219,29 @@ fn sums_on_the_gpu_are_whole() {
         assert!((sum - 1.0).abs() < 2e-5, "{sum}");
     }
 }
+
+#[test]
+#[cfg_attr(not(has_vulkan), ignore = "no Vulkan driver")]
+fn cheap_forms_on_the_gpu_are_those_of_the_cpu() {
+    let gpu =
+        GpuFormFactor::new().expect("a Vulkan adapter: VLM_REQUIRE_GPU is set or a driver is installed");
+    let cases: Vec<Case> = (0..200_000)
+        .map(vlm_tests::form_factor::generate::generate)
+        .filter(|(kind, case)| {
+            let is_plain = *kind == vlm_tests::form_factor::generate::Kind::Anywhere;
+            is_plain && case.aspect() < 10.0 && case.distance() > 0.1 * case.size()
+        })
+        .map(|(_, case)| case)
+        .collect();
+    let bound = ErrorBound::new(1e-3);
+    let on_gpu = gpu.evaluate_within(&cases, &bound).expect("results from the GPU");
+    let mut cheap = 0;
+    for (case, gpu) in cases.iter().zip(on_gpu) {
+        let Some(truth) = truth(case).filter(|t| t.uncosined > 0.0) else { continue };
+        let cpu = form_factor_within(&case.light(), case.x, case.n, &bound);
+        let difference = f64::from((cpu - gpu).abs()) / truth.uncosined;
+        assert!(difference < 2e-5, "{case:?}: {cpu} {gpu}");
+        cheap += u32::from((f64::from(cpu) - truth.form_factor).abs() / truth.uncosined > 1e-5);
+    }
+    assert!(cheap > 100, "the bound is never used: {cheap}");
+}

@@ -73,7 +73,7 @@ impl GpuFormFactor {
     /// # Errors
     /// As [`GpuFormFactor::new`].
     pub fn textbook() -> Result<Self, GpuError> {
-        Self::with_shader(&format!("{}\n{}", wgsl::FORM_FACTOR, include_str!("textbook.wgsl")))
+        Self::with_shader(&[wgsl::FORM_FACTOR, wgsl::RECEIVERS, include_str!("textbook.wgsl")].join("\n"))
     }
 
     /// The sum over lights at each point, see [`GpuFormFactor::measure_sums`].

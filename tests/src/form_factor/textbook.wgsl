@@ -1,16 +1,6 @@
 // The textbook forms of the form factor on the GPU, by the built-in functions: what the kernel is measured against.
-// Appended to shared/form_factor.wgsl; bindings as in form_factor_cases.wgsl.
+// Appended to shared/form_factor.wgsl and shared/receivers.wgsl.
 
-struct Receiver {
-    x: vec3f,
-    n_x: f32,
-    n_yz: vec2f,
-    padding: vec2f,
-}
-
-@group(0) @binding(0) var<storage, read> lights: array<LightGeometry>;
-@group(0) @binding(1) var<storage, read> receivers: array<Receiver>;
-@group(0) @binding(2) var<storage, read_write> results: array<f32>;
 // `centroid` chooses the edge's form: 0 acos, 1 atan2, 2 the LTC fit.
 @group(0) @binding(3) var<storage, read> bound: ErrorBound;
 
@@ -69,5 +59,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if i >= arrayLength(&results) {
         return;
     }
-    results[i] = textbook(lights[i], receivers[i].x, vec3f(receivers[i].n_x, receivers[i].n_yz));
+    results[i] = textbook(lights[i], receivers[i].x, receiver_normal(i));
 }

@@ -322,3 +322,48 @@ fn load<S: Simd>(simd: S, [x, y, z]: &[[f32; LANES]; 3], register: usize) -> Vec
 fn store<S: Simd>(values: &mut [f32; LANES], register: usize, lanes: Lanes<S>) {
     S::as_mut_simd_f32s(values).0[register] = lanes.values;
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    /// Every instruction set that this processor has, not only the widest.
+    fn by_each(light: &LightGeometry, receivers: &Receivers) -> Vec<Vec<f32>> {
+        fn run(simd: impl Simd, light: &LightGeometry, receivers: &Receivers) -> Vec<f32> {
+            let mut results = vec![f32::NAN; receivers.len()];
+            simd.vectorize(Batch { light, receivers, results: &mut results });
+            results
+        }
+        let mut all = vec![run(pulp::Scalar, light, receivers)];
+        #[cfg(target_arch = "x86_64")]
+        {
+            all.extend(pulp::x86::V3::try_new().map(|simd| run(simd, light, receivers)));
+            all.extend(pulp::x86::V4::try_new().map(|simd| run(simd, light, receivers)));
+        }
+        all
+    }
+
+    #[test]
+    fn every_instruction_set_agrees_with_the_scalar_form() {
+        let corner = |x: f64, y: f64| DVec3::new(x, y, 1.0);
+        let light = LightGeometry::new([corner(0.0, 0.0), corner(0.1, 1.0), corner(1.0, 0.0)]);
+        let at = |i: u32| Vec3::new((i % 7) as f32, (i % 11) as f32, (i % 5) as f32) * 0.4 - 1.0;
+        let surface = |i: u32| Vec3::new(0.0, 0.6, if i.is_multiple_of(3) { -0.8 } else { 0.8 });
+        // Both sizes of tile.
+        for count in [50, 5000] {
+            let points: Vec<_> =
+                (0..count).map(|i| (at(i), Vec3::new(0.48, -0.6, 0.64), surface(i))).collect();
+            let receivers = Receivers::on_surfaces(points.iter().copied());
+            for results in by_each(&light, &receivers) {
+                let mut lit = 0;
+                for (&(x, n, surface), result) in points.iter().zip(results) {
+                    let alone = if is_behind(&light, x, surface) { 0.0 } else { form_factor(&light, x, n) };
+                    assert!((alone - result).abs() < 1e-6, "{x}: {alone} {result}");
+                    lit += u32::from(alone > 0.0);
+                }
+                assert!(lit > count / 8, "{lit} of {count}");
+            }
+        }
+    }
+}
