@@ -321,7 +321,7 @@ mod tests {
             (Code::VlmOrder, "/triangle_tags", |a| a.triangle_tags = vec![triangles(1, 1), triangles(0, 1)]),
             (Code::VlmOrder, "/triangle_tags", |a| a.triangle_tags = vec![triangles(1, 1), triangles(1, 2)]),
             (Code::VlmNumber, "/triangle_tags/1", |a| {
-                a.triangle_tags = vec![triangles(0, 1), triangles(1, 0)]
+                a.triangle_tags = vec![triangles(0, 1), triangles(1, 0)];
             }),
             (Code::VlmNumber, "/triangle_tags/0", |a| a.triangle_tags = vec![TriangleTags::default()]),
             (Code::VlmOrder, "/triangle_tags/0", |a| {
