@@ -1,0 +1,285 @@
+//! Meshes on which baking is hard, each drawn beside its builder in `hard_meshes`, at several budgets: the checker, which shares no
+//! code with the baker, finds nothing wrong. And the checker finds what is planted.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::collections::BTreeSet;
+
+use glam::{DVec3, dvec3};
+use vlm_bake::bake::{Bake, BakeError, bake};
+use vlm_bake::options::{BakeOptions, Preset};
+use vlm_bake::progress::Silent;
+use vlm_bake::scene::Scene;
+use vlm_format::VlmAsset;
+use vlm_tests::hard_meshes::checker::{Kind, Light, Surface, Verdict, check, world_lights};
+use vlm_tests::hard_meshes::{HardMesh, sheets, solids};
+
+const BUDGETS: [u32; 3] = [50, 400, 3000];
+
+/// What the baker misses yet: mesh, budget, fault. A line whose fault is gone fails the test too: take it out.
+const MISSED: &[(&str, u32, &str)] = &[];
+
+fn options(scene: &Scene, lights: u32) -> BakeOptions {
+    BakeOptions { lights, ..BakeOptions::preset(Preset::Game, scene.triangles.len()) }
+}
+
+fn baked(mesh: &HardMesh, lights: u32) -> (Scene, Bake) {
+    let scene = mesh.scene().unwrap();
+    let bake = bake(&scene, &options(&scene, lights), &Silent).unwrap();
+    (scene, bake)
+}
+
+/// Bakes at every budget; the faults must be those of [`MISSED`].
+fn check_mesh(name: &str, mesh: &HardMesh) {
+    let scene = mesh.scene().unwrap();
+    let mut words = Vec::new();
+    let mut found = BTreeSet::new();
+    for budget in BUDGETS {
+        let (faults, line) = faults(&scene, budget);
+        println!("{name} {budget}: {line}");
+        for (kind, figures) in faults {
+            words.push(format!("(\"{name}\", {budget}, \"{kind}\"), // {figures}"));
+            found.insert((budget, kind));
+        }
+    }
+    let expected: BTreeSet<(u32, String)> =
+        MISSED.iter().filter(|m| m.0 == name).map(|m| (m.1, m.2.to_owned())).collect();
+    assert!(found == expected, "found\n{}\nexpected {expected:?}", words.join("\n"));
+}
+
+/// The kinds of faults with their figures, and a line that sums the bake up.
+fn faults(scene: &Scene, budget: u32) -> (Vec<(String, String)>, String) {
+    let made = match bake(scene, &options(scene, budget), &Silent) {
+        Ok(made) => made,
+        Err(error @ (BakeError::NothingReflects | BakeError::NothingLeft { .. })) => {
+            return (vec![("NoLights".to_owned(), error.to_string())], error.to_string());
+        }
+    };
+    let verdict = check(scene, &made.asset);
+    let required = made.report.clearance.required_m;
+    let mut faults: Vec<(String, String)> = verdict
+        .by_kind()
+        .into_iter()
+        .map(|(kind, lights, worst)| {
+            let first = verdict.faults.iter().find(|f| f.kind == kind).unwrap();
+            let place = first.place;
+            (
+                format!("{kind:?}"),
+                format!(
+                    "{lights} of {} lights, worst {worst:.2e}, one at {place:.4}, clearance {required:.1e}",
+                    verdict.lights
+                ),
+            )
+        })
+        .collect();
+    let reported = made.report.clearance.violations;
+    if reported > 0 {
+        faults.push((
+            "Reported".to_owned(),
+            format!("{reported} violations, worst {:.1e} m", made.report.clearance.worst_m),
+        ));
+    }
+    let line = format!(
+        "{} lights, {:.1} % tagged, flux {:.3}, {} of {} points covered, clearance {required:.1e} m, mean offset {:.1e} m, {}",
+        verdict.lights,
+        100.0 * verdict.tagged_share,
+        verdict.flux_ratio,
+        verdict.covered,
+        verdict.points,
+        made.report.offset.mean_m,
+        faults.iter().map(|f| f.0.as_str()).collect::<Vec<_>>().join(" "),
+    );
+    (faults, line)
+}
+
+/// A test for each mesh, named for it.
+macro_rules! meshes {
+    ($($name:ident: $mesh:expr;)*) => {
+        $(#[test]
+        fn $name() {
+            check_mesh(stringify!($name), &$mesh);
+        })*
+    };
+}
+
+meshes! {
+    two_plates: sheets::two_plates();
+    two_plates_face_to_face: sheets::two_plates_face_to_face();
+    moebius: sheets::moebius(false);
+    moebius_two_sided: sheets::moebius(true);
+    folded_sheet: sheets::folded_sheet();
+    bowl: solids::bowl();
+    spiral_sheet: sheets::spiral_sheet();
+    spiral_band: solids::spiral_band();
+    ball_in_a_ball: solids::ball_in_a_ball();
+    cube_without_a_face: solids::cube_without_a_face();
+    t_junctions: sheets::t_junctions();
+    doubled_faces: sheets::doubled_faces();
+    zero_area_triangles: solids::zero_area_triangles();
+    fins: solids::fins();
+    terrain_with_a_step: sheets::terrain_with_a_step();
+    inner_corner: sheets::corner(true);
+    outer_corner: sheets::corner(false);
+    closed_plate_of_2_mm: solids::closed_plate(2e-3);
+    closed_plate_of_a_tenth_of_a_mm: solids::closed_plate(1e-4);
+    tube: solids::tube();
+    saddle: sheets::saddle();
+    banner_by_material: sheets::banner(true);
+    banner_by_winding: sheets::banner(false);
+    box_on_a_floor: solids::box_on_a_floor();
+    two_rooms_of_one_object: solids::two_rooms(true);
+    two_rooms_of_two_objects: solids::two_rooms(false);
+    furnished_room: solids::furnished_room();
+    far_from_the_origin: solids::furnished_room().moved(dvec3(1e5, 1e5, -1e5));
+    a_thousandth: solids::furnished_room().scaled(1e-3);
+    ten_thousand_times: solids::furnished_room().scaled(1e4);
+}
+
+/// Scaled by a power of two, nothing rounds differently: the same lights, bit by bit. By powers of ten the coordinates round differently.
+#[test]
+fn scale_changes_nothing_else() {
+    let (_, one) = baked(&solids::furnished_room(), 400);
+    for (factor, tolerance) in [(1.0 / 1024.0, 0.0), (16384.0, 0.0), (1e-3, 1e-5), (1e4, 1e-5)] {
+        let (_, other) = baked(&solids::furnished_room().scaled(factor), 400);
+        let difference = difference(&one, &other, factor);
+        assert!(difference.as_ref().is_ok_and(|d| *d <= tolerance), "by {factor}: {difference:?}");
+    }
+    let (_, other) = baked(&solids::furnished_room().scaled(2.0), 400);
+    assert!(difference(&one, &other, 1.9).is_ok_and(|d| d > 0.01), "the negative control");
+}
+
+/// The greatest distance between corners and samples over the extent of 4 m, after the scale is taken out; in words where more differs.
+fn difference(one: &Bake, other: &Bake, factor: f64) -> Result<f64, String> {
+    let (a, b) = (&one.asset, &other.asset);
+    let lengths = (a.triangles.len(), a.samples.len()) == (b.triangles.len(), b.samples.len());
+    if !lengths || a.tags != b.tags || a.primitive_tags != b.primitive_tags {
+        let counts = |asset: &VlmAsset| {
+            (asset.triangles.len(), asset.samples.len(), asset.tags.iter().filter(|&&t| t != 0).count())
+        };
+        return Err(format!("lights, samples, tagged: {:?} and {:?}", counts(a), counts(b)));
+    }
+    let corners = |asset: &VlmAsset| -> Vec<DVec3> {
+        let of_lights = asset.triangles.iter().flatten().map(|&v| asset.positions[v as usize].as_dvec3());
+        of_lights.chain(asset.samples.iter().map(|s| s.position.as_dvec3())).collect()
+    };
+    let apart = corners(a).into_iter().zip(corners(b)).map(|(p, q)| p.distance(q / factor) / 4.0);
+    let offsets = one.report.offset.mean_m / (other.report.offset.mean_m / factor) - 1.0;
+    Ok(apart.fold(offsets.abs(), f64::max))
+}
+
+/// Pairs of a banner's light and a point that it lights: on the wall, and on the banner.
+fn lit_by_the_banner(scene: &Scene, asset: &VlmAsset) -> (usize, usize) {
+    let surface = Surface::new(scene, asset);
+    let on_banner = |p: DVec3| (p.z - sheets::BANNER_DISTANCE).abs() < 1e-3;
+    let lights = world_lights(scene, asset);
+    let of_banner = |l: &&Light| l.samples.iter().all(|s| on_banner(s.0));
+    let mut lit = (0, 0);
+    for light in lights.iter().filter(of_banner) {
+        for (t, triangle) in surface.triangles.iter().enumerate() {
+            let x = triangle.iter().sum::<DVec3>() / 3.0;
+            let shielded = light.tag != 0 && light.tag == surface.tags[t];
+            let sees = |n: DVec3| {
+                (x - light.corners[0]).dot(light.normal) > 0.0
+                    && light.corners.iter().any(|v| (*v - x).dot(n) > 0.0)
+            };
+            if !shielded && surface.sides(t).iter().any(|&side| sees(side * surface.normals[t])) {
+                *(if on_banner(x) { &mut lit.1 } else { &mut lit.0 }) += 1;
+            }
+        }
+    }
+    lit
+}
+
+fn check_banner(by_material: bool) {
+    for budget in BUDGETS {
+        let (scene, made) = baked(&sheets::banner(by_material), budget);
+        let (wall, banner) = lit_by_the_banner(&scene, &made.asset);
+        assert!(wall > 0, "{budget}: the banner's light does not reach the wall");
+        assert_eq!(banner, 0, "{budget}: the banner lights itself");
+        let untagged = VlmAsset { tags: Vec::new(), primitive_tags: Vec::new(), ..made.asset };
+        assert!(lit_by_the_banner(&scene, &untagged).1 > 0, "the negative control");
+    }
+}
+
+#[test]
+#[should_panic(expected = "does not reach the wall")]
+fn a_banner_by_material_lights_the_wall_and_not_itself() {
+    check_banner(true);
+}
+
+#[test]
+#[should_panic(expected = "does not reach the wall")]
+fn a_banner_by_winding_lights_the_wall_and_not_itself() {
+    check_banner(false);
+}
+
+/// Number of lights with a fault of that kind.
+fn count(verdict: &Verdict, kind: Kind) -> usize {
+    verdict.faults.iter().filter(|f| f.kind == kind).count()
+}
+
+/// Moves the corners of one light, which get vertices of their own.
+fn move_light(asset: &mut VlmAsset, light: usize, place: impl Fn(DVec3) -> DVec3) {
+    for corner in 0..3 {
+        let moved = place(asset.positions[asset.triangles[light][corner] as usize].as_dvec3());
+        asset.triangles[light][corner] = asset.positions.len() as u32;
+        asset.positions.push(moved.as_vec3());
+    }
+}
+
+#[test]
+fn the_checker_finds_a_light_pushed_forward() {
+    let (scene, Bake { mut asset, .. }) = baked(&solids::closed_plate(0.5), 400);
+    assert_eq!(check(&scene, &asset).faults, []);
+    let light = 7;
+    let forward = 0.01 * 2.0 * world_lights(&scene, &asset)[light].normal;
+    move_light(&mut asset, light, |p| p + forward);
+    let faults = check(&scene, &asset).faults;
+    assert!(faults.iter().any(|f| f.kind == Kind::LightsItself && f.light == 7), "{faults:?}");
+    assert!(faults.iter().all(|f| f.light == 7), "{faults:?}");
+}
+
+#[test]
+fn the_checker_finds_a_light_pushed_through_the_back() {
+    let (scene, Bake { mut asset, .. }) = baked(&solids::closed_plate(0.05), 400);
+    assert_eq!(check(&scene, &asset).faults, []);
+    let up = |l: &Light| l.normal.z > 0.9 && l.tag == 0;
+    let light = world_lights(&scene, &asset).iter().position(up).unwrap();
+    move_light(&mut asset, light, |p| p - 0.06 * DVec3::Z);
+    let faults = check(&scene, &asset).faults;
+    assert!(faults.iter().all(|f| f.kind == Kind::ComesOut && f.light == light as u32), "{faults:?}");
+    assert_eq!(faults.len(), 1);
+}
+
+#[test]
+fn the_checker_finds_a_needle() {
+    let (scene, Bake { mut asset, .. }) = baked(&solids::closed_plate(0.5), 400);
+    let [a, b, c] = asset.triangles[3].map(|v| asset.positions[v as usize].as_dvec3());
+    let foot = a + (b - a) * (c - a).dot(b - a) / (b - a).length_squared();
+    move_light(&mut asset, 3, |p| if p == c { foot + (c - foot) * 1e-4 } else { p });
+    let verdict = check(&scene, &asset);
+    assert_eq!(count(&verdict, Kind::TooThin), 1);
+    assert!(verdict.faults.iter().all(|f| f.light == 3));
+}
+
+#[test]
+fn the_checker_finds_a_missing_tag() {
+    let (scene, Bake { mut asset, .. }) = baked(&sheets::two_sided_quad(), 50);
+    assert_eq!(check(&scene, &asset).faults, []);
+    asset.tags[4] = 0;
+    let faults = check(&scene, &asset).faults;
+    assert!(faults.iter().any(|f| f.kind == Kind::LightsItself && f.light == 4), "{faults:?}");
+    let untagged = VlmAsset { primitive_tags: Vec::new(), ..asset };
+    assert_eq!(count(&check(&scene, &untagged), Kind::LightsItself), untagged.triangles.len());
+}
+
+#[test]
+fn the_checker_finds_lost_and_doubled_light() {
+    let (scene, Bake { asset, .. }) = baked(&solids::closed_plate(0.5), 400);
+    assert_eq!(count(&check(&scene, &asset), Kind::Flux), 0);
+    for factor in [0.97, 1.03] {
+        let mut other = asset.clone();
+        other.samples.iter_mut().for_each(|s| s.reflectance *= factor);
+        assert_eq!(count(&check(&scene, &other), Kind::Flux), 1, "{factor}");
+    }
+}
