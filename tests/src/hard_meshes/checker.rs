@@ -1,13 +1,14 @@
 //! Checks a bake from its asset and the visible triangles alone, by brute force; calls nothing of the code that it checks.
 //!
-//! Points are spread over every triangle. The light of a point is the nearest that looks its way (within 37 degrees): of those that
-//! carry a sample of the point's triangle, else of those whose samples lie on the same connected part and primitive.
-//! - A light *lights itself* where it lights a sample that it carries or a point of which it is the light, and the triangle there
-//!   does not bear its tag.
-//! - An untagged light *comes out* where a straight walk to it from just behind the surface leaves through the back of a triangle of another
-//!   side (more than 60 degrees off the light's normal) or meets a two-sided one. The walk goes from each point to the nearest place
-//!   of its light, and to the light's own corners and middles from the surface nearest to them. In a scene of closed surfaces it must
-//!   also end in free space: bodies may overlap.
+//! Points are spread over every triangle. The light of a point is the nearest that looks its way (within 37 degrees), of those whose
+//! samples lie on the same connected part and primitive. A triangle that bears a light's tag never sees it.
+//! - A light *lights itself* where it comes nearer than the clearance to lighting a sample that it carries, or a point of which it is the
+//!   light. It *lights its triangle* where it lights any other point of a triangle on which its samples lie.
+//! - An untagged light *lies in front* where its place nearest to one of its samples is above that sample's horizon.
+//! - An untagged light *comes out* where a straight walk to it from just behind the surface leaves through the back of a triangle of
+//!   another side (more than 60 degrees off the light's normal) or meets a two-sided one. The walk goes from each point to the nearest
+//!   place of its light, and to the light's own corners and middles from the surface nearest to them. In a scene of closed surfaces it
+//!   must also end in free space: bodies may overlap.
 
 use glam::{DMat3, DVec3};
 use vlm_bake::scene::Scene;
@@ -47,8 +48,12 @@ pub enum Kind {
     NoLights,
     /// A sample does not lie on the surface of its object.
     SampleOffSurface,
-    /// It lights surface that it stands for.
+    /// It lights surface that it stands for, or nearly.
     LightsItself,
+    /// It lights surface that another light stands for, on a triangle on which its own samples lie.
+    LightsItsTriangle,
+    /// It lies before its own samples.
+    LiesInFront,
     /// It comes out on another side.
     ComesOut,
     /// It is longer than 100 times its height.
@@ -66,7 +71,7 @@ pub struct Fault {
     pub light: u32,
     /// Where, world space, metres.
     pub place: DVec3,
-    /// By how much: metres, or the ratio for [`Kind::TooThin`] and [`Kind::Flux`].
+    /// By how much it would have to move, metres; or the ratio for [`Kind::TooThin`] and [`Kind::Flux`].
     pub by: f64,
 }
 
@@ -193,9 +198,12 @@ fn check_samples(surface: &Surface, lights: &[Light], verdict: &mut Verdict) -> 
                 verdict.add(Fault { kind: Kind::SampleOffSurface, light: l as u32, place: x, by });
             }
             // Where triangles lie upon each other, the light belongs to the one that bears its tag.
-            let tagged = found.iter().any(|&t| shields(surface, light, t));
-            if !tagged {
+            if !found.iter().any(|&t| shields(surface, light, t)) {
                 judge(surface, light, l, (x, n), verdict);
+            }
+            let height = (closest_on(light.corners, x) - x).dot(n);
+            if light.tag == 0 && height > surface.rounding {
+                verdict.add(Fault { kind: Kind::LiesInFront, light: l as u32, place: x, by: height });
             }
             own.extend(found);
         }
@@ -211,17 +219,22 @@ fn shields(surface: &Surface, light: &Light, triangle: u32) -> bool {
     light.tag != 0 && light.tag == surface.tags[triangle as usize]
 }
 
-/// Adds a fault if the light lights a place.
-fn judge(surface: &Surface, light: &Light, number: usize, (x, n): (DVec3, DVec3), verdict: &mut Verdict) {
+/// How far a place lies within a light's reach: the lesser of its height before the light's plane and of the light's height over its horizon.
+fn lit_by(light: &Light, x: DVec3, n: DVec3) -> f64 {
     let before = (x - light.corners[0]).dot(light.normal);
     let above = light.corners.iter().map(|v| (*v - x).dot(n)).fold(f64::NEG_INFINITY, f64::max);
-    let by = before.min(above);
-    if by > surface.rounding {
+    before.min(above)
+}
+
+/// Adds a fault if a light lights a place for which it stands, or comes nearer to that than the clearance.
+fn judge(surface: &Surface, light: &Light, number: usize, (x, n): (DVec3, DVec3), verdict: &mut Verdict) {
+    let by = lit_by(light, x, n) + surface.clearance;
+    if by > 0.0 {
         verdict.add(Fault { kind: Kind::LightsItself, light: number as u32, place: x, by });
     }
 }
 
-/// Points of every triangle against the light that stands for them.
+/// Points of every triangle against the light that stands for them and against those with samples on that triangle.
 fn check_points(surface: &Surface, lights: &[Light], owned: &[Vec<u32>], verdict: &mut Verdict) {
     let candidates = surface.candidates(owned);
     let total: f64 = surface.areas.iter().sum();
@@ -230,23 +243,47 @@ fn check_points(surface: &Surface, lights: &[Light], owned: &[Vec<u32>], verdict
         for side in surface.sides(t) {
             let normal = side * surface.normals[t];
             let alike = |l: &&u32| lights[**l as usize].normal.dot(normal) > ALIKE;
-            let own: Vec<u32> = candidates.of_triangle(t).iter().filter(alike).copied().collect();
+            let unshielded = |l: &&u32| !shields(surface, &lights[**l as usize], t as u32);
             let kin: Vec<u32> = candidates.of_part(surface.part[t]).iter().filter(alike).copied().collect();
-            let from = if own.is_empty() { &kin } else { &own };
+            let own = candidates.of_triangle(t).iter().filter(alike).filter(unshielded);
+            let own: Vec<u32> = own.copied().collect();
             for i in 0..count {
                 verdict.points += 1;
                 let x = place_on(surface.triangles[t], i);
-                let Some((l, nearest)) = nearest_light(lights, from, x) else { continue };
-                verdict.covered += 1;
-                let light = &lights[l as usize];
-                if !shields(surface, light, t as u32) {
-                    judge(surface, light, l as usize, (x, normal), verdict);
+                for &l in &own {
+                    let by = lit_by(&lights[l as usize], x, normal);
+                    if by > surface.rounding {
+                        verdict.add(Fault { kind: Kind::LightsItsTriangle, light: l, place: x, by });
+                    }
                 }
-                if light.tag == 0 {
-                    walk(surface, light, l, (x, normal), nearest, t, verdict);
-                }
+                check_own_light(surface, lights, &kin, (x, normal), t, verdict);
             }
         }
+    }
+}
+
+/// A point of triangle `t` against its light. Where several are equally near, as on both sides of a common edge, the point is any one's:
+/// it is wrong only if none of them would do.
+fn check_own_light(
+    surface: &Surface,
+    lights: &[Light],
+    kin: &[u32],
+    (x, n): (DVec3, DVec3),
+    t: usize,
+    verdict: &mut Verdict,
+) {
+    let nearest = nearest_lights(lights, kin, x, surface.rounding);
+    verdict.covered += usize::from(!nearest.is_empty());
+    let unshielded = |l: u32| !shields(surface, &lights[l as usize], t as u32);
+    let lit = |&(l, _): &(u32, DVec3)| {
+        if unshielded(l) { lit_by(&lights[l as usize], x, n) } else { f64::NEG_INFINITY }
+    };
+    let Some(&(l, end)) = nearest.iter().min_by(|a, b| lit(a).total_cmp(&lit(b))) else { return };
+    if unshielded(l) {
+        judge(surface, &lights[l as usize], l as usize, (x, n), verdict);
+    }
+    if lights[l as usize].tag == 0 {
+        walk(surface, &lights[l as usize], l, (x, n), end, t, verdict);
     }
 }
 
@@ -258,9 +295,15 @@ fn place_on([a, b, c]: Triangle, i: u32) -> DVec3 {
     a + (b - a) * u + (c - a) * v
 }
 
-fn nearest_light(lights: &[Light], from: &[u32], x: DVec3) -> Option<(u32, DVec3)> {
-    let places = from.iter().map(|&l| (l, closest_on(lights[l as usize].corners, x)));
-    places.min_by(|a, b| a.1.distance_squared(x).total_cmp(&b.1.distance_squared(x)))
+/// The nearest lights with their nearest places; several if their distances differ by less than `slack`.
+fn nearest_lights(lights: &[Light], from: &[u32], x: DVec3, slack: f64) -> Vec<(u32, DVec3)> {
+    let places: Vec<(u32, DVec3, f64)> = from
+        .iter()
+        .map(|&l| (l, closest_on(lights[l as usize].corners, x)))
+        .map(|(l, place)| (l, place, place.distance(x)))
+        .collect();
+    let least = places.iter().map(|p| p.2).fold(f64::INFINITY, f64::min);
+    places.iter().filter(|p| p.2 <= least + slack).map(|&(l, place, _)| (l, place)).collect()
 }
 
 /// Walks from just behind a surface point to a place of its light.
@@ -274,17 +317,14 @@ fn walk(
     verdict: &mut Verdict,
 ) {
     let segment = Segment::new(x - n * surface.step, end);
-    let leaves = |t: &usize| {
-        let other = surface.normals[*t].dot(light.normal) < OTHER_SIDE;
-        let out = other && segment.direction.dot(surface.normals[*t]) > 0.0;
-        *t != own && (out || surface.two_sided[*t]) && segment.meets(surface.triangles[*t])
+    let leaves = |t: usize| {
+        let other = surface.normals[t].dot(light.normal) < OTHER_SIDE;
+        let out = other && segment.direction.dot(surface.normals[t]) > 0.0;
+        if t == own || !(out || surface.two_sided[t]) { None } else { segment.meets(surface.triangles[t]) }
     };
-    let Some(t) = (0..surface.triangles.len()).find(leaves) else { return };
-    if surface.closed && !surface.is_free(end) {
-        return;
-    }
-    let by = (end - surface.triangles[t][0]).dot(surface.normals[t]).abs();
-    if by > surface.rounding {
+    let share = (0..surface.triangles.len()).filter_map(leaves).fold(f64::INFINITY, f64::min);
+    let by = (1.0 - share) * segment.direction.length();
+    if by > surface.rounding && !(surface.closed && !surface.is_free(end)) {
         verdict.add(Fault { kind: Kind::ComesOut, light: number, place: end, by });
     }
 }

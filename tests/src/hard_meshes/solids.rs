@@ -172,7 +172,25 @@ pub fn zero_area_triangles() -> HardMesh {
     HardMesh::of(triangles)
 }
 
-/// A room with a ball, a block and a plate in it: something of everything, for the tests of scale and place.
+/// A room with a block and a two-sided plate in it: nothing is curved, so that rounding decides nothing in its bake.
+/// ```text
+///    +-----------+
+///    |           |
+///    |     [] -- |
+///    +-----------+
+/// ```
+#[must_use]
+pub fn flat_room() -> HardMesh {
+    let room = turned(&cuboid(DVec3::ZERO, dvec3(4.0, 3.0, 2.5), 3));
+    let block = cuboid(dvec3(2.0, 1.0, 0.0), dvec3(2.6, 1.7, 0.8), 2);
+    let plate = plane(dvec3(3.0, 1.0, 0.7), 0.6 * DVec3::X, 0.9 * DVec3::Y, [2, 2]);
+    HardMesh::default()
+        .with("room", vec![Piece::new(room)])
+        .with("block", vec![Piece::new(block).of_albedo([0.7, 0.1, 0.1])])
+        .with("plate", vec![Piece::new(plate).two_sided()])
+}
+
+/// The same with a bumpy ball: something of everything.
 /// ```text
 ///    +-----------+
 ///    |  o        |
@@ -181,12 +199,8 @@ pub fn zero_area_triangles() -> HardMesh {
 /// ```
 #[must_use]
 pub fn furnished_room() -> HardMesh {
-    let room = turned(&cuboid(DVec3::ZERO, dvec3(4.0, 3.0, 2.5), 3));
-    let block = cuboid(dvec3(2.0, 1.0, 0.0), dvec3(2.6, 1.7, 0.8), 2);
-    let plate = plane(dvec3(3.0, 1.0, 0.7), 0.6 * DVec3::X, 0.9 * DVec3::Y, [2, 2]);
-    HardMesh::default()
-        .with("room", vec![Piece::new(room)])
-        .with("ball", vec![Piece::new(ball(dvec3(1.0, 1.5, 1.0), 8, |_| 0.5)).of_albedo([0.2, 0.3, 0.7])])
-        .with("block", vec![Piece::new(block).of_albedo([0.7, 0.1, 0.1])])
-        .with("plate", vec![Piece::new(plate).two_sided()])
+    let bumpy = ball(dvec3(1.0, 1.5, 1.0), 8, |d| {
+        0.5 + 0.02 * libm::sin(3.1 * d.x + 1.0) + 0.015 * libm::sin(4.7 * d.y + 2.3 * d.z)
+    });
+    flat_room().with("ball", vec![Piece::new(bumpy).of_albedo([0.2, 0.3, 0.7])])
 }

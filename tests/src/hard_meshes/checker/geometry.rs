@@ -53,20 +53,21 @@ impl Segment {
         Self { from, low: from.min(to), high: from.max(to), direction: to - from }
     }
 
-    /// True if the walk passes through the triangle: its ends lie on both sides of the plane, and the line passes all three edges on
-    /// the same side (signs of the volumes that it spans with them).
-    pub fn meets(&self, [a, b, c]: Triangle) -> bool {
+    /// The share of the walk after which it passes through the triangle: its ends lie on both sides of the plane, and the line passes
+    /// all three edges on the same side (signs of the volumes that it spans with them).
+    pub fn meets(&self, [a, b, c]: Triangle) -> Option<f64> {
         if a.max(b).max(c).cmplt(self.low).any() || a.min(b).min(c).cmpgt(self.high).any() {
-            return false;
+            return None;
         }
         let n = cross([a, b, c]);
         let (start, end) = ((self.from - a).dot(n), (self.from + self.direction - a).dot(n));
         if start * end >= 0.0 {
-            return false;
+            return None;
         }
         let side = |p: DVec3, q: DVec3| (p - self.from).cross(q - self.from).dot(self.direction);
         let sides = [side(a, b), side(b, c), side(c, a)];
-        sides.iter().all(|&s| s >= 0.0) || sides.iter().all(|&s| s <= 0.0)
+        let passes = sides.iter().all(|&s| s >= 0.0) || sides.iter().all(|&s| s <= 0.0);
+        passes.then(|| start / (start - end))
     }
 }
 

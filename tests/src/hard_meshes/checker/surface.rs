@@ -29,6 +29,9 @@ pub struct Surface {
     pub extent: f64,
     /// Heights below this are rounding of single precision, metres.
     pub rounding: f64,
+    /// How far a light must lie behind what it stands for, metres: half a step of 14-bit quantisation for it and for the surface, and the
+    /// rounding of a few operations. It is half of what the baker asks for, whose other half is a margin.
+    pub clearance: f64,
     /// How far behind the surface walks begin, metres.
     pub step: f64,
     /// Every edge has its opposite: the surface bounds a volume.
@@ -70,7 +73,8 @@ impl Surface {
         let low = corners().fold(DVec3::INFINITY, |low, p| low.min(*p));
         let high = corners().fold(DVec3::NEG_INFINITY, |high, p| high.max(*p));
         let extent = (high - low).max_element();
-        let rounding = 4.0 * low.abs().max(high.abs()).max_element() * 2f64.powi(-24);
+        let farthest = low.abs().max(high.abs()).max_element();
+        let rounding = 4.0 * farthest * 2f64.powi(-24);
         let mut surface = Self {
             normals: triangles.iter().map(|&t| unit_normal(t)).collect(),
             tags: all.clone().map(|t| tag_of_triangle(scene, asset, t)).collect(),
@@ -78,6 +82,7 @@ impl Surface {
             object: all.clone().map(|t| primitive_of(t).object).collect(),
             flux: all.map(|t| areas[t] * albedo(t) * sides(t)).sum(),
             closed: is_closed(&keys),
+            clearance: extent * 2f64.powi(-14) + 8.0 * farthest * 2f64.powi(-24),
             step: 1e-6 * extent + rounding,
             two_sided,
             areas,
