@@ -17,7 +17,63 @@ use vlm_tests::hard_meshes::{HardMesh, sheets, solids};
 const BUDGETS: [u32; 3] = [50, 400, 3000];
 
 /// What the baker misses yet: mesh, budget, fault. A line whose fault is gone fails the test too: take it out.
-const MISSED: &[(&str, u32, &str)] = &[];
+const MISSED: &[(&str, u32, &str)] = &[
+    ("a_thousandth", 50, "Flux"),                  // 2.4 % of the flux
+    ("a_thousandth", 400, "LightsItself"),         // 23 of 400 lights, by 5.05e-6 m
+    ("ball_in_a_ball", 50, "Flux"),                // 10 % of the flux
+    ("ball_in_a_ball", 400, "LightsItself"),       // 15 of 400 lights, by 1.03e-2 m
+    ("ball_in_a_ball", 3000, "LightsItsTriangle"), // 1 of 3000 lights, by 1.91e-3 m
+    ("bowl", 50, "Flux"),                          // 11 % of the flux
+    ("bowl", 50, "LightsItself"),                  // 3 of 50 lights, by 1.25e-1 m
+    ("bowl", 50, "Tagged"),                        // 98 % of the area
+    ("bowl", 400, "LightsItself"),                 // 19 of 400 lights, by 2.77e-2 m
+    ("bowl", 400, "Tagged"),                       // 70 % of the area
+    ("bowl", 3000, "LightsItself"),                // 17 of 3000 lights, by 5.49e-4 m
+    ("closed_plate_of_2_mm", 50, "Tagged"),        // 12 % of the area
+    ("far_from_the_origin", 50, "Flux"),           // 5 % of the flux
+    ("folded_sheet", 50, "ComesOut"),              // 2 of 50 lights, by 2.24e-5 m
+    ("folded_sheet", 3000, "LiesInFront"),         // 33 of 3000 lights, by 1.78e-4 m
+    ("folded_sheet", 3000, "LightsItsTriangle"),   // 32 of 3000 lights, by 1.33e-4 m
+    ("furnished_room", 50, "ComesOut"),            // 4 of 50 lights, by 1.18e-1 m
+    ("furnished_room", 50, "Flux"),                // 2.5 % of the flux
+    ("furnished_room", 400, "LightsItself"),       // 32 of 400 lights, by 5.97e-3 m
+    ("moebius", 50, "LightsItself"),               // 7 of 50 lights, by 2.49e-2 m
+    ("moebius", 400, "LightsItself"),              // 11 of 400 lights, by 6.26e-3 m
+    ("moebius_two_sided", 50, "Flux"),             // 11 % of the flux
+    ("saddle", 50, "LightsItself"),                // 4 of 50 lights, by 2.63e-2 m
+    ("saddle", 400, "LightsItself"),               // 15 of 400 lights, by 9.48e-3 m
+    ("spiral_band", 50, "ComesOut"),               // 2 of 50 lights, by 5.28e-1 m
+    ("spiral_band", 50, "Flux"),                   // 25 % of the flux
+    ("spiral_band", 50, "LiesInFront"),            // 2 of 50 lights, by 8.59e-2 m
+    ("spiral_band", 50, "Tagged"),                 // 97 % of the area
+    ("spiral_band", 400, "LightsItself"),          // 2 of 400 lights, by 9.37e-3 m
+    ("spiral_band", 400, "Tagged"),                // 5 % of the area
+    ("spiral_sheet", 50, "LightsItself"),          // 2 of 50 lights, by 3.04e-2 m
+    ("ten_thousand_times", 50, "Flux"),            // 2.9 % of the flux
+    ("ten_thousand_times", 400, "LightsItself"),   // 30 of 400 lights, by 5.05e1 m
+    ("tube", 50, "ComesOut"),                      // 2 of 50 lights, by 1.43e-1 m
+    ("tube", 50, "Flux"),                          // 9 % of the flux
+    ("tube", 50, "LiesInFront"),                   // 1 of 50 lights, by 4.70e-2 m
+    ("tube", 50, "Tagged"),                        // 94 % of the area
+    ("tube", 400, "Tagged"),                       // 24 % of the area
+];
+
+/// Sheets may be tagged whole, and so may a plate thinner than the clearance.
+const MAY_BE_TAGGED: [&str; 10] = [
+    "moebius",
+    "moebius_two_sided",
+    "folded_sheet",
+    "spiral_sheet",
+    "saddle",
+    "fins",
+    "doubled_faces",
+    "banner_by_material",
+    "banner_by_winding",
+    "closed_plate_of_a_tenth_of_a_mm",
+];
+
+/// Share of the lights' area that may carry a tag on everything else.
+const MOST_TAGGED: f64 = 0.03;
 
 fn options(scene: &Scene, lights: u32) -> BakeOptions {
     BakeOptions { lights, ..BakeOptions::preset(Preset::Game, scene.triangles.len()) }
@@ -35,7 +91,7 @@ fn check_mesh(name: &str, mesh: &HardMesh) {
     let mut words = Vec::new();
     let mut found = BTreeSet::new();
     for budget in BUDGETS {
-        let (faults, line) = faults(&scene, budget);
+        let (faults, line) = faults(&scene, budget, MAY_BE_TAGGED.contains(&name));
         println!("{name} {budget}: {line}");
         for (kind, figures) in faults {
             words.push(format!("(\"{name}\", {budget}, \"{kind}\"), // {figures}"));
@@ -48,7 +104,7 @@ fn check_mesh(name: &str, mesh: &HardMesh) {
 }
 
 /// The kinds of faults with their figures, and a line that sums the bake up.
-fn faults(scene: &Scene, budget: u32) -> (Vec<(String, String)>, String) {
+fn faults(scene: &Scene, budget: u32, may_be_tagged: bool) -> (Vec<(String, String)>, String) {
     let made = match bake(scene, &options(scene, budget), &Silent) {
         Ok(made) => made,
         Err(error @ (BakeError::NothingReflects | BakeError::NothingLeft { .. })) => {
@@ -78,6 +134,9 @@ fn faults(scene: &Scene, budget: u32) -> (Vec<(String, String)>, String) {
             "Reported".to_owned(),
             format!("{reported} violations, worst {:.1e} m", made.report.clearance.worst_m),
         ));
+    }
+    if verdict.tagged_share > MOST_TAGGED && !may_be_tagged {
+        faults.push(("Tagged".to_owned(), format!("{:.0} % of the area", 100.0 * verdict.tagged_share)));
     }
     let line = format!(
         "{} lights, {:.1} % tagged, flux {:.3}, {} of {} points covered, clearance {required:.1e} m, mean offset {:.1e} m, {}",
@@ -136,41 +195,53 @@ meshes! {
     ten_thousand_times: solids::furnished_room().scaled(1e4);
 }
 
-/// Scaled by a power of two, nothing rounds differently: the same lights, bit by bit. By a power of ten, coordinates round differently;
-/// what is flat comes out the same within that rounding, what is curved may be decimated another way, to as many lights as far behind.
+/// Scaled by a power of two, nothing rounds differently: the same lights, bit by bit.
 #[test]
-fn scale_changes_nothing_else() {
-    let flat = solids::flat_room as fn() -> HardMesh;
-    let curved = solids::furnished_room as fn() -> HardMesh;
-    let mut wrong = Vec::new();
-    for (name, mesh, factor, tolerance) in [
-        ("curved", curved, 1.0 / 1024.0, 0.0),
-        ("curved", curved, 16384.0, 0.0),
-        ("flat", flat, 1e-3, 1e-5),
-        ("flat", flat, 1e4, 1e-5),
-    ] {
-        let (one, other) = (baked(&mesh(), 400).1, baked(&mesh().scaled(factor), 400).1);
-        let difference = difference(&one, &other, factor);
-        if difference.as_ref().is_ok_and(|d| *d > tolerance) || difference.is_err() {
-            wrong.push(format!("{name} by {factor}: {difference:?}"));
-        }
+fn a_power_of_two_changes_nothing_else() {
+    let one = baked(&solids::furnished_room(), 400).1;
+    for factor in [1.0 / 1024.0, 16384.0] {
+        let other = baked(&solids::furnished_room().scaled(factor), 400).1;
+        assert_eq!(difference(&one, &other, factor), Ok(0.0), "by {factor}");
     }
-    let one = baked(&curved(), 400).1;
-    for factor in [1e-3, 1e4] {
-        let other = baked(&curved().scaled(factor), 400).1;
-        let offsets = other.report.offset.mean_m / factor / one.report.offset.mean_m;
-        let same = other.report.lights == one.report.lights && (offsets - 1.0).abs() < 0.05;
-        if !same || other.asset.primitive_tags != one.asset.primitive_tags {
-            let [a, b] = [&one, &other].map(|b| (b.report.lights, &b.asset.primitive_tags));
-            wrong.push(format!("curved by {factor}: {a:?}, {b:?}, offsets' ratio {offsets}"));
-        }
-    }
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    let (one, other) = (baked(&flat(), 400).1, baked(&flat().scaled(2.0), 400).1);
+    let other = baked(&solids::furnished_room().scaled(2.0), 400).1;
     assert!(difference(&one, &other, 1.9).is_ok_and(|d| d > 0.01), "the negative control");
 }
 
-/// The greatest distance between corners and samples over the extent of 4 m, after the scale is taken out; in words where more differs.
+/// Scaled by a power of ten, coordinates round differently; what is flat comes out the same within that rounding.
+#[test]
+#[should_panic(expected = "[Ok(1.0")] // missed yet: rounding decides which of two equal lights is divided
+fn a_power_of_ten_changes_rounding_alone() {
+    let one = baked(&solids::flat_room(), 400).1;
+    let differences = [1e-3, 1e4].map(|factor| {
+        let other = baked(&solids::flat_room().scaled(factor), 400).1;
+        difference(&one, &other, factor)
+    });
+    assert!(differences.iter().all(|d| d.as_ref().is_ok_and(|d| *d < 1e-5)), "{differences:?}");
+}
+
+/// What is curved may be decimated another way where rounding decides between two collapses: to as many lights, as far behind, with
+/// the same tags.
+#[test]
+#[should_panic(expected = "mean offset")] // missed yet: 10 % by 1e-3, 8 % by 1e4
+fn a_power_of_ten_changes_no_figure() {
+    let figures = |factor: f64| {
+        let made = baked(&solids::furnished_room().scaled(factor), 400).1;
+        (made.report.lights, made.asset.primitive_tags.clone(), made.report.offset.mean_m / factor)
+    };
+    let one = figures(1.0);
+    for factor in [1e-3, 1e4] {
+        let other = figures(factor);
+        assert!((one.0, &one.1) == (other.0, &other.1), "by {factor}: {one:?} {other:?}");
+        assert!(
+            (other.2 / one.2 - 1.0).abs() < 0.05,
+            "by {factor}: mean offset {} against {}",
+            other.2,
+            one.2
+        );
+    }
+}
+
+/// The greatest distance between corners over the extent of 4 m, or the difference of mean offsets over one of them, after the scale is taken out; in words where more differs.
 fn difference(one: &Bake, other: &Bake, factor: f64) -> Result<f64, String> {
     let (a, b) = (&one.asset, &other.asset);
     let lengths = (a.triangles.len(), a.samples.len()) == (b.triangles.len(), b.samples.len());
@@ -181,8 +252,7 @@ fn difference(one: &Bake, other: &Bake, factor: f64) -> Result<f64, String> {
         return Err(format!("lights, samples, tagged: {:?} and {:?}", counts(a), counts(b)));
     }
     let corners = |asset: &VlmAsset| -> Vec<DVec3> {
-        let of_lights = asset.triangles.iter().flatten().map(|&v| asset.positions[v as usize].as_dvec3());
-        of_lights.chain(asset.samples.iter().map(|s| s.position.as_dvec3())).collect()
+        asset.triangles.iter().flatten().map(|&v| asset.positions[v as usize].as_dvec3()).collect()
     };
     let apart = corners(a).into_iter().zip(corners(b)).map(|(p, q)| p.distance(q / factor) / 4.0);
     let offsets = one.report.offset.mean_m / (other.report.offset.mean_m / factor) - 1.0;
@@ -224,13 +294,13 @@ fn check_banner(by_material: bool) {
 }
 
 #[test]
-#[should_panic(expected = "does not reach the wall")]
+#[should_panic(expected = "does not reach the wall")] // missed yet: the wall has the banner's tag
 fn a_banner_by_material_lights_the_wall_and_not_itself() {
     check_banner(true);
 }
 
 #[test]
-#[should_panic(expected = "does not reach the wall")]
+#[should_panic(expected = "does not reach the wall")] // missed yet: the wall has the banner's tag
 fn a_banner_by_winding_lights_the_wall_and_not_itself() {
     check_banner(false);
 }
@@ -259,6 +329,17 @@ fn the_checker_finds_a_light_pushed_forward() {
     let faults = check(&scene, &asset).faults;
     assert!(faults.iter().any(|f| f.kind == Kind::LiesInFront && f.light == 7), "{faults:?}");
     assert!(faults.iter().all(|f| f.light == 7), "{faults:?}");
+}
+
+/// The same, turned round: it shines on its own surface.
+#[test]
+fn the_checker_finds_a_light_that_faces_its_surface() {
+    let (scene, Bake { mut asset, .. }) = baked(&solids::closed_plate(0.5), 400);
+    let forward = 0.01 * 2.0 * world_lights(&scene, &asset)[7].normal;
+    move_light(&mut asset, 7, |p| p + forward);
+    asset.triangles[7].swap(1, 2);
+    let faults = check(&scene, &asset).faults;
+    assert!(faults.iter().any(|f| f.kind == Kind::LightsItself && f.light == 7), "{faults:?}");
 }
 
 #[test]

@@ -324,7 +324,7 @@ fn walk(
     };
     let share = (0..surface.triangles.len()).filter_map(leaves).fold(f64::INFINITY, f64::min);
     let by = (1.0 - share) * segment.direction.length();
-    if by > surface.rounding && !(surface.closed && !surface.is_free(end)) {
+    if by > surface.rounding && (!surface.closed || surface.is_free(end)) {
         verdict.add(Fault { kind: Kind::ComesOut, light: number, place: end, by });
     }
 }

@@ -206,10 +206,10 @@ fn parts(keys: &[[Bits; 3]], primitive: &[u32]) -> Vec<u32> {
     };
     loop {
         let mut least: BTreeMap<_, u32> = BTreeMap::new();
-        for t in 0..keys.len() {
+        for (t, &own) in part.iter().enumerate() {
             for i in 0..3 {
-                let entry = least.entry(edge(t, i)).or_insert(part[t]);
-                *entry = (*entry).min(part[t]);
+                let entry = least.entry(edge(t, i)).or_insert(own);
+                *entry = own.min(*entry);
             }
         }
         let next = (0..keys.len()).map(|t| (0..3).map(|i| least[&edge(t, i)]).fold(part[t], u32::min));
