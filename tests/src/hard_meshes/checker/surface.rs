@@ -44,13 +44,17 @@ pub struct Surface {
 
 type Bits = [u32; 3];
 
-/// The receiver's tag of a scene triangle, as a renderer finds it.
+/// The receiver's tag of a scene triangle, as a renderer finds it: its node's, else its primitive's, else its own.
 #[must_use]
 pub fn tag_of_triangle(scene: &Scene, asset: &VlmAsset, triangle: usize) -> u32 {
-    let ScenePrimitive { mesh, primitive, .. } =
+    let ScenePrimitive { object, mesh, primitive, .. } =
         scene.primitives[scene.triangle_primitive[triangle] as usize];
-    let of_primitive = asset.primitive_tags.iter().find(|&&(m, p, _)| (m, p) == (mesh, primitive));
-    of_primitive.map_or(0, |&(_, _, tag)| tag)
+    let node = scene.objects[object as usize].node;
+    let of_node = asset.node_tags.iter().filter(|t| t.0 == node).map(|t| t.1);
+    let of_primitive = asset.primitive_tags.iter().filter(|t| (t.0, t.1) == (mesh, primitive)).map(|t| t.2);
+    let of_triangle = asset.triangle_tags.iter().filter(|t| (t.mesh, t.primitive) == (mesh, primitive));
+    let number = scene.triangle_in_primitive[triangle] as usize;
+    of_node.chain(of_primitive).chain(of_triangle.map(|t| t.tags[number])).next().unwrap_or(0)
 }
 
 impl Surface {
