@@ -45,8 +45,7 @@ impl<'a> Snap<'a> {
     #[must_use]
     pub fn new(patches: &'a Patches) -> Self {
         let region = |t: usize| patches.triangle_region[t];
-        let regions =
-            GroupedBvh::new(&patches.positions, &patches.triangles, region, patches.regions.len());
+        let regions = GroupedBvh::new(&patches.positions, &patches.triangles, region, patches.regions.len());
         Self { patches, regions }
     }
 
@@ -341,8 +340,7 @@ mod tests {
         let (positions, triangles) = quarter_cylinder(5);
         let patches = surface(positions.clone(), triangles.clone());
         let snap = Snap::new(&patches);
-        let mut refiner =
-            Refiner::new(mesh(positions, &triangles), vec![1.0; triangles.len()], &snap);
+        let mut refiner = Refiner::new(mesh(positions, &triangles), vec![1.0; triangles.len()], &snap);
         for face in [3, 3, 3, 0, 7, 3] {
             let before = refiner.mesh.area(face as usize);
             refiner.cut_face(face);

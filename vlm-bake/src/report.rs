@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::flux::ObjectFlux;
 use crate::tag::TagReport;
 use crate::verify::ClearanceReport;
 
@@ -32,6 +33,8 @@ pub struct Report {
     pub tags: Vec<TagReport>,
     /// Total area of the lights, and of those that carry a tag, square metres.
     pub area: AreaReport,
+    /// What each object sends out, and what its lights do.
+    pub flux: Vec<ObjectFlux>,
     /// The grid, all 0 if the asset has none.
     pub grid: GridReport,
     /// Seconds per stage, in alphabetical order of the stages.
@@ -51,6 +54,10 @@ pub struct DecimationReport {
     pub reached: usize,
     /// The simplifier's error, metres.
     pub error_m: f64,
+    /// Mean distance of the surface from the faces that stand for it, metres.
+    pub mean_m: f64,
+    /// The distance that 99 % of the covered surface keeps, metres.
+    pub p99_m: f64,
 }
 
 /// The offset in figures.
@@ -73,6 +80,8 @@ pub struct AreaReport {
     pub lights_m2: f64,
     /// Area of the lights that carry a tag, square metres.
     pub tagged_m2: f64,
+    /// Area of the visible surface that some tag keeps dark from these lights, square metres; both sides of two-sided surface.
+    pub covered_by_tags_m2: f64,
 }
 
 /// The grid in figures.

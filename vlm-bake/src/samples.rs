@@ -3,9 +3,10 @@
 //! A light lies behind the surface, so a shadow test at the light itself would always say "in shadow". Phase 1 instead finds the
 //! irradiance `E` at the light's samples and sums
 //! ```text
-//! B = emission + sum_s reflectance_s E_s,      sum_s reflectance_s = albedo (A_surface / A_light) intensity tint
+//! B = emission + sum_s reflectance_s E_s,      sum_s reflectance_s = albedo (A_surface / A_light)
 //! ```
-//! The ratio of the areas keeps the reflected flux where the light is smaller or larger than its surface.
+//! The ratio of the areas keeps the reflected flux where the light is smaller or larger than its surface; `flux` then makes up for
+//! surface for which no light stands.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -14,8 +15,9 @@ use std::f32::consts::PI;
 
 use crate::correspondence::{Light, Standing};
 use crate::patches::Patches;
-use crate::scene::{Scene, Steering};
+use crate::scene::Scene;
 use crate::surface::SurfacePoint;
+use crate::tag::Accusation;
 
 /// The surface may be at most this many times as large as the light that stands for it: more would make that light a hot spot. What
 /// is cut off is lost.
@@ -34,6 +36,8 @@ pub struct BakedLight {
     pub emission: Vec3,
     /// 0 for none.
     pub tag: u32,
+    /// What it must not light, if anything.
+    pub accused: Option<Accusation>,
     /// Made by an artist.
     pub authored: bool,
     /// Where phase 1 looks.
@@ -55,6 +59,8 @@ pub struct WorldSample {
 #[derive(Clone, Copy)]
 struct Candidate<'a> {
     point: &'a SurfacePoint,
+    /// Where a sample would be: inside its triangle.
+    position: DVec3,
     albedo: Vec3,
     emission: Vec3,
 }
@@ -67,8 +73,8 @@ pub struct Sources<'a> {
     pub patches: &'a Patches,
     /// Per light, a number that it shares with the lights of its neighbourhood: parts of one face of the decimated mesh.
     pub group: &'a [u32],
-    /// Tag per light.
-    pub tags: &'a [u32],
+    /// Per light, what it must not light.
+    pub accused: &'a [Option<Accusation>],
     /// Points on the visible surface.
     pub points: &'a [SurfacePoint],
     /// Which of them each light stands for.
@@ -105,63 +111,59 @@ fn finish_light(
     let candidates = candidates(sources, number);
     let region = sources.patches.regions[light.region as usize];
     let object = sources.scene.primitives[region.primitive as usize].object;
-    let steering = &sources.scene.objects[object as usize].steering;
-    let bare =
-        BakedLight { corners: light.corners, object, tag: sources.tags[number], ..BakedLight::default() };
-    let finished = colour(bare, &candidates, ratio, steering, count);
+    let accused = sources.accused[number].clone();
+    let bare = BakedLight { corners: light.corners, object, accused, ..BakedLight::default() };
+    let finished = colour(bare, &candidates, ratio, count);
     (!finished.samples.is_empty() || finished.emission != Vec3::ZERO).then_some(finished)
 }
 
-/// The points of a light with the colours of the surface there, each the mean over the point's share of the area. Points
-/// without area, at vertices and edges, count only where there is no other.
+/// The points of a light with the colours of the surface there, each the mean over the point's share of the area.
 fn candidates<'a>(sources: &Sources<'a>, number: usize) -> Vec<Candidate<'a>> {
     let coloured = |&p: &u32| {
         let point = &sources.points[p as usize];
         let triangle = sources.patches.triangle_source[point.triangle as usize];
         let surface = sources.scene.albedo_at(triangle as usize, point.barycentric, point.area as f32);
-        Candidate { point, albedo: surface.reflectance(), emission: surface.emission * PI }
+        let position = point.inner(sources.patches);
+        Candidate { point, position, albedo: surface.reflectance(), emission: surface.emission * PI }
     };
-    let own = sources.standing.of(number);
-    let with_area = own.iter().filter(|&&p| sources.points[p as usize].area > 0.0);
-    let spread: Vec<Candidate> = with_area.map(coloured).collect();
-    if spread.is_empty() { own.iter().map(coloured).collect() } else { spread }
+    sources.standing.of(number).iter().map(coloured).collect()
 }
 
 /// Finishes a light from its candidates.
-fn colour(
-    mut light: BakedLight,
-    candidates: &[Candidate],
-    ratio: f32,
-    steering: &Steering,
-    count: usize,
-) -> BakedLight {
+fn colour(mut light: BakedLight, candidates: &[Candidate], ratio: f32, count: usize) -> BakedLight {
     if candidates.is_empty() {
         return light;
     }
-    let strength = steering.tint * steering.intensity;
-    let each = 1.0 / candidates.len() as f32;
-    light.albedo = candidates.iter().map(|c| c.albedo).sum::<Vec3>() * each;
-    light.emission = candidates.iter().map(|c| c.emission).sum::<Vec3>() * each * ratio * strength;
+    let area: f64 = candidates.iter().map(|c| c.point.area).sum();
+    let share = |c: &Candidate| (c.point.area / area) as f32;
+    light.albedo = candidates.iter().map(|c| c.albedo * share(c)).sum();
+    light.emission = candidates.iter().map(|c| c.emission * share(c)).sum::<Vec3>() * ratio;
     let chosen = spread(candidates, count);
     light.samples = chosen
         .iter()
-        .map(|c| WorldSample { position: c.point.position, normal: c.point.normal, reflectance: Vec3::ZERO })
+        .map(|c| WorldSample { position: c.position, normal: c.point.normal, reflectance: Vec3::ZERO })
         .collect();
     for candidate in candidates {
-        let away = |s: &WorldSample| s.position.distance_squared(candidate.point.position);
+        let away = |s: &WorldSample| s.position.distance_squared(candidate.position);
         if let Some(nearest) = light.samples.iter_mut().min_by(|a, b| away(a).total_cmp(&away(b))) {
-            nearest.reflectance += candidate.albedo * (each * ratio) * strength;
+            nearest.reflectance += candidate.albedo * (share(candidate) * ratio);
         }
     }
-    light.samples.retain(|s| s.reflectance != Vec3::ZERO);
+    // One stays even where all are black: it tells what the light stands for.
+    let reflects = light.samples.iter().any(|s| s.reflectance != Vec3::ZERO);
+    if reflects {
+        light.samples.retain(|s| s.reflectance != Vec3::ZERO);
+    } else {
+        light.samples.truncate(1);
+    }
     light
 }
 
 /// At most `count` candidates far from each other: first the one nearest to their centre, then always the farthest from all
 /// chosen (Gonzalez 1985).
 fn spread<'a>(candidates: &[Candidate<'a>], count: usize) -> Vec<Candidate<'a>> {
-    let centre = candidates.iter().map(|c| c.point.position).sum::<DVec3>() / candidates.len() as f64;
-    let mut away: Vec<f64> = candidates.iter().map(|c| -c.point.position.distance_squared(centre)).collect();
+    let centre = candidates.iter().map(|c| c.position).sum::<DVec3>() / candidates.len() as f64;
+    let mut away: Vec<f64> = candidates.iter().map(|c| -c.position.distance_squared(centre)).collect();
     let mut chosen: Vec<Candidate> = Vec::with_capacity(count);
     while chosen.len() < count.min(candidates.len()) {
         let Some(next) = (0..candidates.len()).max_by(|&a, &b| away[a].total_cmp(&away[b]).then(b.cmp(&a)))
@@ -171,7 +173,7 @@ fn spread<'a>(candidates: &[Candidate<'a>], count: usize) -> Vec<Candidate<'a>> 
         let first = chosen.is_empty();
         chosen.push(candidates[next]);
         for (away, c) in away.iter_mut().zip(candidates) {
-            let distance = c.point.position.distance_squared(candidates[next].point.position);
+            let distance = c.position.distance_squared(candidates[next].position);
             *away = if first { distance } else { away.min(distance) };
         }
     }
