@@ -17,46 +17,7 @@ use vlm_tests::hard_meshes::{HardMesh, sheets, solids};
 const BUDGETS: [u32; 3] = [50, 400, 3000];
 
 /// What the baker misses yet: mesh, budget, fault. A line whose fault is gone fails the test too: take it out.
-const MISSED: &[(&str, u32, &str)] = &[
-    ("a_thousandth", 50, "Flux"),                  // 2.4 % of the flux
-    ("a_thousandth", 400, "LightsItself"),         // 23 of 400 lights, by 5.05e-6 m
-    ("ball_in_a_ball", 50, "Flux"),                // 10 % of the flux
-    ("ball_in_a_ball", 400, "LightsItself"),       // 15 of 400 lights, by 1.03e-2 m
-    ("ball_in_a_ball", 3000, "LightsItsTriangle"), // 1 of 3000 lights, by 1.91e-3 m
-    ("bowl", 50, "Flux"),                          // 11 % of the flux
-    ("bowl", 50, "LightsItself"),                  // 3 of 50 lights, by 1.25e-1 m
-    ("bowl", 50, "Tagged"),                        // 98 % of the area
-    ("bowl", 400, "LightsItself"),                 // 19 of 400 lights, by 2.77e-2 m
-    ("bowl", 400, "Tagged"),                       // 70 % of the area
-    ("bowl", 3000, "LightsItself"),                // 17 of 3000 lights, by 5.49e-4 m
-    ("closed_plate_of_2_mm", 50, "Tagged"),        // 12 % of the area
-    ("far_from_the_origin", 50, "Flux"),           // 5 % of the flux
-    ("folded_sheet", 50, "ComesOut"),              // 2 of 50 lights, by 2.24e-5 m
-    ("folded_sheet", 3000, "LiesInFront"),         // 33 of 3000 lights, by 1.78e-4 m
-    ("folded_sheet", 3000, "LightsItsTriangle"),   // 32 of 3000 lights, by 1.33e-4 m
-    ("furnished_room", 50, "ComesOut"),            // 4 of 50 lights, by 1.18e-1 m
-    ("furnished_room", 50, "Flux"),                // 2.5 % of the flux
-    ("furnished_room", 400, "LightsItself"),       // 32 of 400 lights, by 5.97e-3 m
-    ("moebius", 50, "LightsItself"),               // 7 of 50 lights, by 2.49e-2 m
-    ("moebius", 400, "LightsItself"),              // 11 of 400 lights, by 6.26e-3 m
-    ("moebius_two_sided", 50, "Flux"),             // 11 % of the flux
-    ("saddle", 50, "LightsItself"),                // 4 of 50 lights, by 2.63e-2 m
-    ("saddle", 400, "LightsItself"),               // 15 of 400 lights, by 9.48e-3 m
-    ("spiral_band", 50, "ComesOut"),               // 2 of 50 lights, by 5.28e-1 m
-    ("spiral_band", 50, "Flux"),                   // 25 % of the flux
-    ("spiral_band", 50, "LiesInFront"),            // 2 of 50 lights, by 8.59e-2 m
-    ("spiral_band", 50, "Tagged"),                 // 97 % of the area
-    ("spiral_band", 400, "LightsItself"),          // 2 of 400 lights, by 9.37e-3 m
-    ("spiral_band", 400, "Tagged"),                // 5 % of the area
-    ("spiral_sheet", 50, "LightsItself"),          // 2 of 50 lights, by 3.04e-2 m
-    ("ten_thousand_times", 50, "Flux"),            // 2.9 % of the flux
-    ("ten_thousand_times", 400, "LightsItself"),   // 30 of 400 lights, by 5.05e1 m
-    ("tube", 50, "ComesOut"),                      // 2 of 50 lights, by 1.43e-1 m
-    ("tube", 50, "Flux"),                          // 9 % of the flux
-    ("tube", 50, "LiesInFront"),                   // 1 of 50 lights, by 4.70e-2 m
-    ("tube", 50, "Tagged"),                        // 94 % of the area
-    ("tube", 400, "Tagged"),                       // 24 % of the area
-];
+const MISSED: &[(&str, u32, &str)] = &[];
 
 /// Sheets may be tagged whole, and so may a plate thinner than the clearance.
 const MAY_BE_TAGGED: [&str; 10] = [
@@ -209,7 +170,6 @@ fn a_power_of_two_changes_nothing_else() {
 
 /// Scaled by a power of ten, coordinates round differently; what is flat comes out the same within that rounding.
 #[test]
-#[should_panic(expected = "[Ok(1.0")] // missed yet: rounding decides which of two equal lights is divided
 fn a_power_of_ten_changes_rounding_alone() {
     let one = baked(&solids::flat_room(), 400).1;
     let differences = [1e-3, 1e4].map(|factor| {
@@ -222,7 +182,6 @@ fn a_power_of_ten_changes_rounding_alone() {
 /// What is curved may be decimated another way where rounding decides between two collapses: to as many lights, as far behind, with
 /// the same tags.
 #[test]
-#[should_panic(expected = "mean offset")] // missed yet: 10 % by 1e-3, 8 % by 1e4
 fn a_power_of_ten_changes_no_figure() {
     let figures = |factor: f64| {
         let made = baked(&solids::furnished_room().scaled(factor), 400).1;
@@ -282,9 +241,10 @@ fn lit_by_the_banner(scene: &Scene, asset: &VlmAsset) -> (usize, usize) {
         for (t, triangle) in surface.triangles.iter().enumerate() {
             let x = triangle.iter().sum::<DVec3>() / 3.0;
             let shielded = light.tag != 0 && light.tag == surface.tags[t];
+            // A light in the plane of its surface is a rounding away from lighting it.
             let sees = |n: DVec3| {
-                (x - light.corners[0]).dot(light.normal) > 0.0
-                    && light.corners.iter().any(|v| (*v - x).dot(n) > 0.0)
+                (x - light.corners[0]).dot(light.normal) > -1e-6
+                    && light.corners.iter().any(|v| (*v - x).dot(n) > -1e-6)
             };
             if !shielded && surface.sides(t).iter().any(|&side| sees(side * surface.normals[t])) {
                 *(if on_banner(x) { &mut lit.1 } else { &mut lit.0 }) += 1;
@@ -306,13 +266,11 @@ fn check_banner(by_material: bool) {
 }
 
 #[test]
-#[should_panic(expected = "does not reach the wall")] // missed yet: the wall has the banner's tag
 fn a_banner_by_material_lights_the_wall_and_not_itself() {
     check_banner(true);
 }
 
 #[test]
-#[should_panic(expected = "does not reach the wall")] // missed yet: the wall has the banner's tag
 fn a_banner_by_winding_lights_the_wall_and_not_itself() {
     check_banner(false);
 }

@@ -89,26 +89,27 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let ground = Ground::new(scene, &patches);
     let coarse = mesh.lights();
     let points = ground.points(options.lights as usize);
-    let light_of_point = Correspondence::new(&ground, &coarse, |_| true).of(&points);
-    let distance = measured_distance(&points, &light_of_point, &coarse);
+    let owners = Correspondence::new(&ground, &coarse, |_| true).of(&points);
+    let distance = measured_distance(&points, &owners.straight, &coarse);
     let deepest = DEEPEST * (ground.clearance + distance.mean_m);
     let around = Surroundings { ground: &ground, points: &points, deepest };
     let snap = Snap::new(&patches);
-    let density = densities(scene, &patches, &mesh, &Standing::new(&light_of_point, coarse.len()));
+    let density = densities(scene, &patches, &mesh, &Standing::new(&owners, coarse.len()));
     let budget = (options.lights as usize).saturating_sub(authored::count(scene));
     let hidden = mend(Refiner::new(mesh, density, &snap), budget, &around);
 
     clock.stage("verify");
     let hidden = kept(scene, &ground, &points, hidden);
     let lights = &hidden.lights;
-    let light_of_point = Correspondence::new(&ground, lights, |_| true).of(&points);
-    let standing = Standing::new(&light_of_point, lights.len());
+    let owners = Correspondence::new(&ground, lights, |_| true).of(&points);
+    let standing = Standing::new(&owners, lights.len());
     let evidence = Evidence { ground: &ground, points: &points, standing: &standing };
     let violations = verify(lights, &evidence);
 
     clock.stage("samples");
     let accused = accusations(&patches, lights, violations);
     let group = &hidden.coarse;
+    let standing = Standing::straight(&owners, lights.len());
     let sources =
         Sources { scene, patches: &patches, group, accused: &accused, points: &points, standing: &standing };
     let mut baked = samples(&sources, lights, options.samples);
@@ -142,7 +143,7 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
         decimation: decimation_report(&decimation, distance),
         offset: offset_report(lights, &hidden.depths),
         clearance: proof.report(),
-        area: area_report(&points, &light_of_point, &baked, &tags),
+        area: area_report(&points, &owners.straight, &baked, &tags),
         flux,
         tags: tags.reports,
         grid: grid_report,
@@ -197,8 +198,8 @@ fn kept(scene: &Scene, ground: &Ground, points: &[SurfacePoint], hidden: Hidden)
         light.corners = as_stored(object.world_from_node, light.corners);
     });
     let shaped: Vec<bool> = lights.iter().map(|l| aspect_ratio(l.corners) <= MAX_ASPECT).collect();
-    let light_of_point = Correspondence::new(ground, &lights, |l| shaped[l]).of(points);
-    let standing = Standing::new(&light_of_point, lights.len());
+    let owners = Correspondence::new(ground, &lights, |l| shaped[l]).of(points);
+    let standing = Standing::straight(&owners, lights.len());
     let keep = |l: usize| shaped[l] && !standing.of(l).is_empty();
     let chosen: Vec<usize> = (0..lights.len()).filter(|&l| keep(l)).collect();
     Hidden {
@@ -214,7 +215,7 @@ fn accusations(patches: &Patches, lights: &[Light], violations: Vec<Violation>) 
     for violation in violations {
         let light = &lights[violation.light as usize];
         let two_sided = patches.regions[light.region as usize].two_sided;
-        let triangles = violation.triangles.iter().map(|&t| patches.triangle_source[t as usize]).collect();
+        let triangles = violation.triangles.iter().flat_map(|&t| patches.scene_triangles(t)).collect();
         accused[violation.light as usize] =
             Some(Accusation { triangles, reason: reason(two_sided, violation.pokes_out) });
     }

@@ -34,6 +34,8 @@ pub struct Patches {
     pub triangles: Vec<[u32; 3]>,
     /// The scene's triangle.
     pub triangle_source: Vec<u32>,
+    /// Triangles that the scene holds again, with the scene's number of the second; ascending.
+    pub twins: Vec<(u32, u32)>,
     /// Both sides reflect: the material says so, or the file holds the triangle a second time, turned round.
     pub triangle_two_sided: Vec<bool>,
     /// Index into `regions`.
@@ -60,6 +62,13 @@ impl Patches {
     #[must_use]
     pub fn corners(&self, triangle: usize) -> [DVec3; 3] {
         self.triangles[triangle].map(|v| self.positions[v as usize])
+    }
+
+    /// The scene's triangles that lie there: one, or more where it is modelled several times.
+    pub fn scene_triangles(&self, triangle: u32) -> impl Iterator<Item = u32> {
+        let first = self.twins.partition_point(|&(of, _)| of < triangle);
+        let twins = self.twins[first..].iter().take_while(move |&&(of, _)| of == triangle);
+        std::iter::once(self.triangle_source[triangle as usize]).chain(twins.map(|&(_, twin)| twin))
     }
 
     /// Area of a triangle's front in square metres.
@@ -122,6 +131,7 @@ fn weld(scene: &Scene, surfaces: &[Surface]) -> Patches {
             Entry::Occupied(first) => {
                 let (first, first_turned) = *first.get();
                 patches.triangle_two_sided[first as usize] |= turned != first_turned;
+                patches.twins.push((first, t as u32));
             }
             Entry::Vacant(free) => {
                 free.insert((patches.triangles.len() as u32, turned));
@@ -131,6 +141,7 @@ fn weld(scene: &Scene, surfaces: &[Surface]) -> Patches {
             }
         }
     }
+    patches.twins.sort_unstable();
     patches
 }
 

@@ -31,6 +31,9 @@ const SNAP_COSINE: f64 = 0.7;
 /// The faces around a new vertex may be this slender at most: less than a light may, as offset changes shapes a little.
 const SNAP_ASPECT: f64 = 0.5 * MAX_ASPECT;
 
+/// Edges whose squared lengths differ by less than about this part of an octave count as equally long.
+const TIES: f64 = 1e6;
+
 /// An edge is walked to longer ones at most this often: ties and rounding must not make that endless.
 const LONGEST_WALK: usize = 64;
 
@@ -154,7 +157,9 @@ impl<'a> Refiner<'a> {
     fn candidate(&self, edge: [u32; 2]) -> Option<Candidate> {
         let faces = self.faces_of_edge.get(&edge)?;
         let density = faces.iter().map(|&f| self.density[f as usize]).fold(0.0, f64::max);
-        (density > 0.0).then(|| Candidate { priority: self.squared_length(edge) * density, edge })
+        let priority = self.squared_length(edge) * density;
+        // Equal but for rounding is equal, so that a scene of another scale is cut alike.
+        (density > 0.0).then(|| Candidate { priority: (priority.log2() * TIES).round(), edge })
     }
 
     fn squared_length(&self, [a, b]: [u32; 2]) -> f64 {

@@ -18,6 +18,7 @@ use crate::patches::Patches;
 use crate::scene::Scene;
 use crate::surface::SurfacePoint;
 use crate::tag::Accusation;
+use crate::topology::cross_of;
 
 /// The surface may be at most this many times as large as the light that stands for it: more would make that light a hot spot. What
 /// is cut off is lost.
@@ -138,7 +139,11 @@ fn colour(mut light: BakedLight, candidates: &[Candidate], ratio: f32, count: us
     let share = |c: &Candidate| (c.point.area / area) as f32;
     light.albedo = candidates.iter().map(|c| c.albedo * share(c)).sum();
     light.emission = candidates.iter().map(|c| c.emission * share(c)).sum::<Vec3>() * ratio;
-    let chosen = spread(candidates, count);
+    // Samples in a recess that the light bridges are the last choice: the light lies before them.
+    let normal = cross_of(light.corners).normalize_or_zero();
+    let before = |c: &&Candidate| (c.point.position - light.corners[0]).dot(normal) > 0.0;
+    let behind: Vec<Candidate> = candidates.iter().filter(before).copied().collect();
+    let chosen = spread(if behind.is_empty() { candidates } else { &behind }, count);
     light.samples = chosen
         .iter()
         .map(|c| WorldSample { position: c.position, normal: c.point.normal, reflectance: Vec3::ZERO })

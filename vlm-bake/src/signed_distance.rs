@@ -10,7 +10,8 @@ use glam::DVec3;
 
 use crate::grouped_bvh::GroupedBvh;
 use crate::patches::Patches;
-use crate::topology::{cross_of, edge_uses, edges};
+use crate::surface::SurfacePoint;
+use crate::topology::{barycentric, cross_of, edge_uses, edges};
 
 /// A nearest point belongs to an edge or vertex if its barycentric weights come this close to it. Higher values take
 /// points beside an edge for points on it, which costs accuracy only where the two faces differ much.
@@ -20,6 +21,7 @@ const ON_FEATURE: f64 = 1e-4;
 pub struct IslandDistance<'a> {
     patches: &'a Patches,
     islands: GroupedBvh,
+    normals: Vec<DVec3>,
     vertex_normals: Vec<DVec3>,
     edge_normals: Vec<[DVec3; 3]>,
 }
@@ -46,7 +48,7 @@ impl<'a> IslandDistance<'a> {
             (0..patches.triangles.len()).map(|t| cross_of(patches.corners(t)).normalize_or_zero()).collect();
         let vertex_normals = vertex_normals(patches, &normals);
         let edge_normals = edge_normals(patches, &normals);
-        Self { patches, islands, vertex_normals, edge_normals }
+        Self { patches, islands, normals, vertex_normals, edge_normals }
     }
 
     /// The nearest place of an island to `p`; `None` if the island has no triangle.
@@ -60,6 +62,23 @@ impl<'a> IslandDistance<'a> {
         // On the surface itself, where rounding hides the side, the height over the plane is the distance.
         let height = away.dot(normal);
         Some(SignedNear { signed: away.length().copysign(height), normal, triangle: near.triangle })
+    }
+
+    /// The point of an island nearest to `p` on a triangle whose normal is within that cosine of `normal`.
+    #[must_use]
+    pub fn alike(&self, p: DVec3, island: u32, normal: DVec3, cosine: f64) -> Option<SurfacePoint> {
+        let alike = |t: u32| self.normals[t as usize].dot(normal) > cosine;
+        let near = self.islands.closest(island, p, f64::INFINITY, alike)?;
+        let corners = self.patches.corners(near.triangle as usize);
+        let position = near.point.as_dvec3() + self.islands.origin();
+        Some(SurfacePoint {
+            position,
+            normal: self.normals[near.triangle as usize],
+            triangle: near.triangle,
+            barycentric: barycentric(corners, position).as_vec3(),
+            area: 0.0,
+            back: false,
+        })
     }
 
     /// The pseudonormal of the feature of a triangle on which a point lies.

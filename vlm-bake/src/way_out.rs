@@ -4,7 +4,7 @@ use std::cell::{Cell, RefCell};
 
 use glam::{DVec3, Vec3};
 
-use crate::bvh::{Bvh, Hit};
+use crate::bvh::Bvh;
 use crate::patches::Patches;
 use crate::scene::Scene;
 
@@ -42,8 +42,8 @@ impl WayOut {
             _ => Kind::OneSided,
         };
         let mut kinds: Vec<Kind> = (0..scene.triangles.len()).map(kind).collect();
-        for (&source, &two_sided) in patches.triangle_source.iter().zip(&patches.triangle_two_sided) {
-            if two_sided {
+        for (t, _) in patches.triangle_two_sided.iter().enumerate().filter(|(_, two_sided)| **two_sided) {
+            for source in patches.scene_triangles(t as u32) {
                 kinds[source as usize] = Kind::TwoSided;
             }
         }
@@ -58,21 +58,7 @@ impl WayOut {
         f64::from(self.bvh.leave_distance())
     }
 
-    /// True if a surface point that looks along `normal` (unit) lies inside something solid: its ray, and two oblique ones, all
-    /// meet a back first.
-    #[must_use]
-    pub fn is_buried(&self, point: DVec3, normal: DVec3) -> bool {
-        let start = (point - self.origin).as_vec3();
-        let start = self.bvh.leave(start, normal.as_vec3());
-        let tangent = normal.any_orthonormal_vector();
-        [normal, normal + tangent, normal - tangent].into_iter().all(|direction| {
-            let opaque = |hit: &Hit| self.kinds[hit.triangle as usize] != Kind::Air;
-            let first = self.bvh.hit_where(start, direction.as_vec3(), f32::INFINITY, opaque);
-            first.is_some_and(|hit| !hit.front && self.kinds[hit.triangle as usize] == Kind::OneSided)
-        })
-    }
-
-    /// The opaque triangles that a way crosses.
+    /// The opaque triangles of an object that a way crosses.
     #[must_use]
     pub fn crossed(&self, from: DVec3, to: DVec3, object: u32) -> Vec<u32> {
         let crossed = RefCell::new(Vec::new());
@@ -87,7 +73,8 @@ impl WayOut {
     }
 
     /// True if the way from `from` to `to`, which starts inside an object or behind a sheet, ends in the open: it leaves
-    /// through more backs than it enters fronts, or passes a two-sided surface. Scene triangles that `skip` names do not count.
+    /// the object through more backs than it enters fronts, or passes a two-sided surface of it. Scene triangles that `skip` names do not
+    /// count.
     #[must_use]
     pub fn leads_out(&self, from: DVec3, to: DVec3, object: u32, skip: impl Fn(u32) -> bool) -> bool {
         let way = to - from;

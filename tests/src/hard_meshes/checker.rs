@@ -1,6 +1,6 @@
 //! Checks a bake from its asset and the visible triangles alone, by brute force; calls nothing of the code that it checks.
 //!
-//! Points are spread over every triangle. The light of a point is the nearest that looks its way (within 37 degrees), of those whose
+//! Points are spread over every triangle. The light of a point is the nearest that looks its way (within 26 degrees), of those whose
 //! samples lie on the same connected part and primitive. A triangle that bears a light's tag never sees it.
 //! - A light *lights itself* where it comes nearer than the clearance to lighting a sample that it carries, or a point of which it is the
 //!   light. It *lights its triangle* where it lights any other point of a triangle on which its samples lie.
@@ -24,7 +24,7 @@ use geometry::{Segment, aspect, closest_on, cross, unit_normal};
 pub use surface::{Surface, tag_of_triangle};
 
 /// Cosine between a point's normal and the light that may stand for it.
-const ALIKE: f64 = 0.8;
+const ALIKE: f64 = 0.9;
 
 /// Cosine between a light's normal and a triangle's, below which that is another side.
 const OTHER_SIDE: f64 = 0.5;

@@ -79,6 +79,7 @@ pub fn judge(number: usize, light: &Light, evidence: &Evidence) -> Option<Violat
     let mut violation = Violation { light: number as u32, ..Violation::default() };
     lit_points(number, light, evidence, &mut violation);
     if !evidence.region(light).two_sided {
+        lie_before(number, light, evidence, &mut violation);
         poke_between(number, light, evidence, &mut violation);
         poke_beside(light, evidence, &mut violation);
     }
@@ -105,6 +106,20 @@ fn lit_points(number: usize, light: &Light, evidence: &Evidence, violation: &mut
             violation.points += 1;
             violation.triangles.push(point.triangle);
             violation.note(depth, point.position);
+        }
+    }
+}
+
+/// A light may bridge recesses, but not lie before all that it stands for.
+fn lie_before(number: usize, light: &Light, evidence: &Evidence, violation: &mut Violation) {
+    let normal = light.normal();
+    let height = |point: &SurfacePoint| (point.position - light.corners[0]).dot(normal);
+    let own = || evidence.own_points(number);
+    if own().next().is_some() && own().all(|point| height(point) <= 0.0) {
+        violation.pokes_out = true;
+        violation.triangles.extend(own().map(|point| point.triangle));
+        for point in own() {
+            violation.note(-height(point), point.position);
         }
     }
 }
@@ -153,21 +168,36 @@ fn leads_out(
     out
 }
 
-/// Looks for places of a light that lie in front of its island.
+/// Looks for places of a light that lie in front of its island, or into the open behind it.
 fn poke_beside(light: &Light, evidence: &Evidence, violation: &mut Violation) {
     let [a, b, c] = light.corners;
     let (normal, room) = (light.normal(), POKE_SHARE * evidence.ground.clearance);
     let island = evidence.region(light).island;
+    let distance = &evidence.ground.distance;
     for (i, place) in
         [a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0].into_iter().enumerate()
     {
-        let Some(near) = evidence.ground.distance.at(place, island) else { continue };
+        let Some(near) = distance.at(place, island) else { continue };
         let bridges = i >= 3 && near.normal.dot(normal) >= OTHER_SIDE_COSINE;
         let out = near.signed + room;
         if out > 0.0 && !bridges {
             violation.pokes_out = true;
             violation.triangles.push(near.triangle);
             violation.note(out, place);
+        }
+        // The nearest surface may be the far side of a fold: what looks the light's way tells whether that lies between.
+        let Some(from) = distance.alike(place, island, normal, OTHER_SIDE_COSINE) else { continue };
+        if (place - from.position).dot(from.normal) < 0.0
+            && leads_out(
+                &from,
+                from.inner(evidence.ground.patches),
+                place,
+                evidence,
+                &mut violation.triangles,
+            )
+        {
+            violation.pokes_out = true;
+            violation.note(place.distance(from.position), place);
         }
     }
 }

@@ -68,7 +68,7 @@ pub enum FindingKind {
 pub struct Finding {
     /// Number of the light in the asset.
     pub light: u32,
-    /// What it does wrong; the worse of two.
+    /// What it does wrong; the first of two.
     pub kind: FindingKind,
     /// Number of surface points that it lights.
     pub points: u32,
@@ -140,12 +140,13 @@ pub fn check(scene: &Scene, asset: &VlmAsset, ground: &Ground) -> Verification {
     let lights: Vec<Light> = placed.iter().map(|p| p.light).collect();
     let mut points = ground.points(asset.settings.lights as usize);
     let derived = |l: usize| !placed[l].authored && placed[l].stands;
-    let mut light_of_point = Correspondence::new(ground, &lights, derived).of(&points);
+    let mut owners = Correspondence::new(ground, &lights, derived).of(&points);
     for (l, light) in placed.iter().enumerate() {
-        light_of_point.extend(light.samples.iter().map(|_| Some(l as u32)));
+        owners.straight.extend(light.samples.iter().map(|_| Some(l as u32)));
         points.extend(&light.samples);
     }
-    let standing = Standing::new(&light_of_point, lights.len());
+    let standing = Standing::new(&owners, lights.len());
+    let light_of_point = owners.straight;
     let evidence = Evidence { ground, points: &points, standing: &standing };
     let tags = ReceiverTags::new(scene, asset, ground.patches);
     let find = |l: usize| finding(scene, l, &placed[l], &evidence, &tags);
@@ -180,8 +181,8 @@ fn finding(
     if placed.authored && violation.points == 0 {
         return None;
     }
-    let Violation { points, depth, place, pokes_out, triangles, .. } = violation;
-    let kind = if pokes_out { FindingKind::PokesOut } else { FindingKind::LightsItself };
+    let Violation { points, depth, place, triangles, .. } = violation;
+    let kind = if points > 0 { FindingKind::LightsItself } else { FindingKind::PokesOut };
     let tagged = triangles.iter().all(|&triangle| tags.ignores(triangle, number as u32));
     Some(Finding { kind, points, depth_m: depth, place, triangles, tagged, ..bare })
 }

@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 use serde_json::{Value, json};
-use vlm_format::{Error, GltfFile, read_vlm};
+use vlm_bake::scene::Scene;
+use vlm_format::{Error, read_vlm};
 
 use crate::error::CliError;
+use crate::geometry::{Proof, prove, source};
 use crate::input::open_checked;
 use crate::output::{print, print_json};
 
@@ -17,6 +19,9 @@ pub struct CheckArgs {
     /// glTF files (.glb or .gltf), or - for standard input (.glb)
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
+    /// Also prove that the lights lie behind the surface of this file, from which they were baked
+    #[arg(long, value_name = "SOURCE")]
+    geometry: Option<PathBuf>,
     /// Report as JSON
     #[arg(long)]
     json: bool,
@@ -32,6 +37,9 @@ struct Finding {
     issues: Vec<Value>,
     /// One line with remedy that sums the issues up; empty if there are none.
     summary: String,
+    /// The proof that the lights lie behind their surface, where it was asked for and could be had.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    geometry: Option<Proof>,
 }
 
 /// Runs the command.
@@ -39,11 +47,13 @@ struct Finding {
 /// # Errors
 /// If a file cannot be read, or any file failed.
 pub fn run(args: &CheckArgs) -> Result<(), CliError> {
-    let findings = args.files.iter().map(|path| check(path)).collect::<Result<Vec<_>, _>>()?;
+    let source = args.geometry.as_deref().map(source).transpose()?;
+    let findings =
+        args.files.iter().map(|path| check(path, source.as_ref())).collect::<Result<Vec<_>, _>>()?;
     if args.json {
         print_json(&findings)?;
     } else {
-        print(&findings.iter().map(line).collect::<Vec<_>>())?;
+        print(&findings.iter().flat_map(lines).collect::<Vec<_>>())?;
     }
     let failed: Vec<&Finding> = findings.iter().filter(|finding| !finding.ok).collect();
     match failed.as_slice() {
@@ -56,21 +66,41 @@ pub fn run(args: &CheckArgs) -> Result<(), CliError> {
     }
 }
 
-fn line(finding: &Finding) -> String {
-    if finding.ok {
-        return format!("ok        {}: {} lights", finding.file, finding.lights);
+fn lines(finding: &Finding) -> Vec<String> {
+    if !finding.ok {
+        let mut lines = vec![format!("FAILED    {}: {} issues", finding.file, finding.issues.len())];
+        lines.extend(finding.geometry.iter().flat_map(Proof::lines));
+        return lines;
     }
-    format!("FAILED    {}: {} issues", finding.file, finding.issues.len())
+    let proof = finding.geometry.as_ref().map_or_else(String::new, |proof| {
+        format!(
+            ", all behind their surface ({} points; {} lights fail and are tagged)",
+            proof.clearance.samples, proof.tagged_lights
+        )
+    });
+    vec![format!("ok        {}: {} lights{proof}", finding.file, finding.lights)]
 }
 
 /// # Errors
 /// If the file cannot be read at all.
-fn check(path: &Path) -> Result<Finding, CliError> {
-    let result = open_checked(path).and_then(|file| Ok((lights(&file)?, file)));
-    let name = path.display().to_string();
+fn check(path: &Path, source: Option<&Scene>) -> Result<Finding, CliError> {
+    let result = open_checked(path).and_then(|file| Ok((read_vlm(&file)?, file)));
+    let file = path.display().to_string();
+    let bare =
+        Finding { file, ok: false, lights: 0, issues: Vec::new(), summary: String::new(), geometry: None };
     match result {
-        Ok((Some(lights), _)) => {
-            Ok(Finding { file: name, ok: true, lights, issues: Vec::new(), summary: String::new() })
+        Ok((Some(asset), file)) => {
+            let geometry = source.map(|source| prove(file.name(), &asset, source)).transpose()?;
+            let issues = geometry.as_ref().map_or_else(Vec::new, Proof::issues);
+            let summary = geometry.as_ref().and_then(|proof| proof.summary(file.name())).unwrap_or_default();
+            Ok(Finding {
+                ok: issues.is_empty(),
+                lights: asset.triangles.len(),
+                issues,
+                summary,
+                geometry,
+                ..bare
+            })
         }
         // Tools that drop what they do not know are why one checks at the end of a pipeline.
         Ok((None, file)) => {
@@ -83,21 +113,11 @@ fn check(path: &Path) -> Result<Finding, CliError> {
                  tool",
                 file.name()
             );
-            Ok(Finding { file: name, ok: false, lights: 0, issues: vec![issue], summary })
+            Ok(Finding { issues: vec![issue], summary, ..bare })
         }
         Err(error @ Error::Io { .. }) => Err(error.into()),
-        Err(error) => Ok(Finding {
-            file: name,
-            ok: false,
-            lights: 0,
-            issues: issues(&error),
-            summary: error.to_string(),
-        }),
+        Err(error) => Ok(Finding { issues: issues(&error), summary: error.to_string(), ..bare }),
     }
-}
-
-fn lights(file: &GltfFile) -> Result<Option<usize>, Error> {
-    Ok(read_vlm(file)?.map(|asset| asset.triangles.len()))
 }
 
 /// Every problem, in one form whatever its kind.

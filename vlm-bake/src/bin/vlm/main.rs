@@ -4,6 +4,7 @@
 //! 2 it could not run.
 
 mod error;
+mod geometry;
 mod input;
 mod output;
 mod progress;
