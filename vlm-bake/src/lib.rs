@@ -37,3 +37,5 @@ pub mod emitters;
 pub mod reference;
 pub mod render;
 pub mod picture;
+
+pub mod report_html;

@@ -97,6 +97,11 @@ impl Scene {
         notes
     }
 
+    /// A camera outside that frames the scene along a diagonal, from the front right and above.
+    pub(crate) fn overview(&self) -> Camera {
+        Camera { name: String::from("overview"), ..self.default_camera(Setting::Object) }
+    }
+
     /// A light shines or a surface glows.
     fn is_lit(&self) -> bool {
         let glows =
@@ -263,7 +268,7 @@ fn view_direction(setting: Setting) -> DVec3 {
 }
 
 /// At `eye`, looking along `-backward`, upright.
-fn look(eye: DVec3, backward: DVec3) -> DMat4 {
+pub(crate) fn look(eye: DVec3, backward: DVec3) -> DMat4 {
     let right = DVec3::Y.cross(backward).try_normalize().unwrap_or(DVec3::X);
     let up = backward.cross(right);
     DMat4::from_cols(right.extend(0.0), up.extend(0.0), backward.extend(0.0), eye.extend(1.0))

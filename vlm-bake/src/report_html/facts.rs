@@ -1,0 +1,123 @@
+//! What the pictures show: the facts of each visible point.
+
+use glam::{DVec3, Vec3A};
+use rayon::prelude::*;
+use vlm_format::VlmAsset;
+
+use super::correspondence::{Correspondence, Place};
+use super::lights::WorldLights;
+use super::stand_in::Verification;
+use super::tagged::SurfaceTags;
+use crate::bvh::nearest::closest_point;
+use crate::camera::CameraRays;
+use crate::gbuffer::GBuffer;
+use crate::scene::{Camera, Scene};
+use crate::shade::{SurfacePoint, TraceScene};
+
+/// A pixel's point is known in single precision; it counts as lit by its light only below this share of the clearance.
+const ROUNDING: f64 = 0.98;
+
+/// All that the page is made from, prepared for queries.
+pub struct Evidence<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its tree.
+    pub trace: TraceScene<'a>,
+    /// The lights.
+    pub asset: &'a VlmAsset,
+    /// The lights in world space.
+    pub lights: &'a WorldLights,
+    /// The check.
+    pub verification: &'a Verification,
+    /// Which light stands where.
+    pub correspondence: Correspondence<'a>,
+    /// Tags of the surface.
+    pub tags: SurfaceTags<'a>,
+    /// Per light: it comes out somewhere and no tag keeps it away.
+    pub pokes_out: Vec<bool>,
+}
+
+/// A visible point and what stands for it.
+#[derive(Clone, Copy)]
+pub struct Fact {
+    /// The point.
+    pub point: SurfacePoint,
+    /// Cosine between the sight and the surface, for shading.
+    pub facing: f32,
+    /// What stands for it.
+    pub place: Place,
+    /// The tag of the surface, 0 for none.
+    pub surface_tag: u32,
+    /// About its light; zero where there is none.
+    pub light: LightFact,
+}
+
+/// How a light lies behind a point for which it stands.
+#[derive(Clone, Copy, Default)]
+pub struct LightFact {
+    /// How far the light would have to move until it lit the point, metres; negative if it does.
+    pub clearance_m: f64,
+    /// From the point to the nearest place of the light, metres.
+    pub distance_m: f64,
+    /// The light's tag.
+    pub tag: u32,
+}
+
+impl Fact {
+    /// The light comes too near, tagged or not.
+    pub fn fails(&self, required_m: f64) -> bool {
+        matches!(self.place, Place::Light(_)) && self.light.clearance_m < ROUNDING * required_m
+    }
+
+    /// The surface ignores its own light.
+    pub fn is_kept_dark(&self) -> bool {
+        self.light.tag != 0 && self.light.tag == self.surface_tag
+    }
+}
+
+/// One fact per pixel, row 0 at the top; `None` where nothing is seen.
+pub struct View {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width * height` facts.
+    pub facts: Vec<Option<Fact>>,
+}
+
+impl Evidence<'_> {
+    /// The facts of every pixel of a camera.
+    pub fn view(&self, camera: &Camera, width: u32, height: u32) -> View {
+        let rays = CameraRays::new(camera, width, height);
+        let gbuffer = GBuffer::trace(&self.trace, camera, width, height);
+        let fact = |(i, point): (usize, &Option<SurfacePoint>)| {
+            let ray = rays.through(i as u32 % width, i as u32 / width);
+            point.map(|point| self.fact(point, -ray.direction.dot(point.geometric_normal)))
+        };
+        View { width, height, facts: gbuffer.points.par_iter().enumerate().map(fact).collect() }
+    }
+
+    fn fact(&self, point: SurfacePoint, facing: f32) -> Fact {
+        let place = self.correspondence.light_at(&point);
+        let light = match place {
+            Place::Light(light) => {
+                self.light_fact(light as usize, point.position.as_dvec3(), point.geometric_normal.as_dvec3())
+            }
+            _ => LightFact::default(),
+        };
+        Fact { point, facing, place, surface_tag: self.tags.of(point.triangle), light }
+    }
+
+    /// How a light lies behind a point.
+    pub fn light_fact(&self, light: usize, position: DVec3, normal: DVec3) -> LightFact {
+        let corners = self.lights.corners[light];
+        let rise = corners.iter().map(|v| (*v - position).dot(normal)).fold(f64::NEG_INFINITY, f64::max);
+        let before = (position - corners[0]).dot(self.lights.normals[light]);
+        let local = corners.map(|p| Vec3A::from((p - position).as_vec3()));
+        LightFact {
+            clearance_m: -rise.min(before),
+            distance_m: f64::from(closest_point(&local, Vec3A::ZERO).length()),
+            tag: self.asset.tags.get(light).copied().unwrap_or(0),
+        }
+    }
+}

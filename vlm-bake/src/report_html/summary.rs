@@ -1,0 +1,208 @@
+//! The verdict in plain words, and what to change first.
+
+use super::objects::{ObjectFigures, percent};
+use super::places::{Trouble, WorstPlace};
+use super::text::{area, length, node, plural};
+use crate::report::Report;
+
+/// Uncovered surface up to this share passes without a word.
+const UNCOVERED: f64 = 0.01;
+
+/// Tagged lights up to this share of the lights' area pass without a word.
+const TAGGED: f64 = 0.03;
+
+/// The mean offset may be this many times the decimation error and the clearance together.
+const OFFSET: f64 = 1.5;
+
+/// Things to change that are listed.
+const MOST: usize = 5;
+
+/// How well a bake went.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Level {
+    /// Nothing to do.
+    Good,
+    /// Usable, and can be better.
+    Look,
+    /// Lights shine where they must not.
+    Bad,
+}
+
+/// The verdict.
+pub struct Summary {
+    /// How well it went.
+    pub level: Level,
+    /// In a few words.
+    pub headline: String,
+    /// In a sentence or two.
+    pub text: String,
+    /// What to change, the most rewarding first.
+    pub changes: Vec<String>,
+}
+
+/// Sums up a bake. `open` is the number of lights that fail and that no tag keeps away.
+pub fn summary(report: &Report, open: usize, objects: &[ObjectFigures], places: &[WorstPlace]) -> Summary {
+    let changes = changes(report, open, objects, places);
+    let (level, headline) = match (open, changes.len()) {
+        (0, 0) => (Level::Good, "Fine: nothing to change".to_owned()),
+        (0, _) => (
+            Level::Look,
+            "Usable: no light shines where it must not, but light is lost or displaced".to_owned(),
+        ),
+        _ => (
+            Level::Bad,
+            format!(
+                "Not fine: {}",
+                plural(open, "light shines where it must not", "lights shine where they must not")
+            ),
+        ),
+    };
+    let tagged = report.area.tagged_m2.max(0.0) / report.area.lights_m2.max(f64::MIN_POSITIVE);
+    let uncovered = report.area.uncovered_m2 / report.area.visible_m2.max(f64::MIN_POSITIVE);
+    let hidden = match open {
+        0 => "Every one of them is hidden behind the surface that it stands for, or kept off it by a tag",
+        _ => "The others are hidden behind the surface that they stand for, or kept off it by a tag",
+    };
+    let text = format!(
+        "{} stand for {} of surface. {hidden} ({} of the lights' area is tagged); {} of the surface has no light.",
+        plural(report.lights, "light", "lights"),
+        area(report.area.visible_m2),
+        percent(tagged),
+        percent(uncovered),
+    );
+    Summary { level, headline, text, changes }
+}
+
+fn changes(report: &Report, open: usize, objects: &[ObjectFigures], places: &[WorstPlace]) -> Vec<String> {
+    let found = [
+        open_lights(report, open, places),
+        uncovered(report, objects),
+        missing(objects),
+        tagged(report),
+        budget(report),
+        offset(report),
+    ];
+    found.into_iter().flatten().take(MOST).collect()
+}
+
+fn open_lights(report: &Report, open: usize, places: &[WorstPlace]) -> Option<String> {
+    let worst = places.iter().find(|p| !p.tagged && p.trouble <= Trouble::TooThin).filter(|_| open > 0)?;
+    Some(format!(
+        "{} at {}: see the first of the worst places. {}",
+        worst.title(),
+        node(&worst.object),
+        worst.advice(report.clearance.required_m)
+    ))
+}
+
+fn uncovered(report: &Report, objects: &[ObjectFigures]) -> Option<String> {
+    let share = report.area.uncovered_m2 / report.area.visible_m2.max(f64::MIN_POSITIVE);
+    let most = objects.iter().max_by(|a, b| a.uncovered_m2.total_cmp(&b.uncovered_m2))?;
+    (share > UNCOVERED).then(|| {
+        format!(
+            "{} of the surface bounces no light, most of it ({}) on {}: ask for more lights (--lights {}), or raise \
+             extras.vlm.density on what matters.",
+            percent(share),
+            area(most.uncovered_m2),
+            node(&most.path),
+            2 * report.asked_lights
+        )
+    })
+}
+
+/// The largest object that misses the rule of 2 %, if such objects matter in the scene.
+fn missing(objects: &[ObjectFigures]) -> Option<String> {
+    let missed: Vec<&ObjectFigures> = objects.iter().filter(|o| !o.why_missed().is_empty()).collect();
+    let reflecting = |o: &&ObjectFigures| o.visible_m2 * f64::from(o.albedo.element_sum());
+    let worst = missed.iter().copied().max_by(|a, b| {
+        let lost = |o: &&ObjectFigures| reflecting(o) * (o.flux_ratio - 1.0).abs().max(o.albedo_error());
+        lost(a).total_cmp(&lost(b))
+    })?;
+    let (lost, all): (f64, f64) =
+        (missed.iter().map(|o| reflecting(o)).sum(), objects.iter().map(|o| reflecting(&o)).sum());
+    (lost > 0.01 * all).then(|| {
+        format!(
+            "{} of {} not keep albedo and flux within 2 %; it matters most at {} (flux {}, albedo off by {}): {}.",
+            plural(missed.len(), "object", "objects"),
+            if missed.len() == 1 { format!("{} does", objects.len()) } else { format!("{} do", objects.len()) },
+            node(&worst.path),
+            percent(worst.flux_ratio),
+            percent(worst.albedo_error()),
+            worst.why_missed()
+        )
+    })
+}
+
+fn tagged(report: &Report) -> Option<String> {
+    let share = report.area.tagged_m2 / report.area.lights_m2.max(f64::MIN_POSITIVE);
+    let most = report.tags.iter().max_by(|a, b| a.area_m2.total_cmp(&b.area_m2))?;
+    (share > TAGGED).then(|| {
+        format!(
+            "{} of the lights' area is tagged and does not light surface of the same tag, most of it at {}. If that is not meant to be a \
+             sheet, make it a closed, single-sided solid.",
+            percent(share),
+            node(&most.object)
+        )
+    })
+}
+
+fn budget(report: &Report) -> Option<String> {
+    (!report.missed_because.is_empty()).then(|| {
+        format!(
+            "{} lights were asked and {} made: {}.",
+            report.asked_lights, report.lights, report.missed_because
+        )
+    })
+}
+
+fn offset(report: &Report) -> Option<String> {
+    let allowed = OFFSET * (report.decimation.error_m + report.clearance.required_m);
+    (report.offset.mean_m > allowed).then(|| {
+        format!(
+            "Lights lie {} deep on average, where {} would do: hollows and folds push them down. More lights let them follow the \
+             surface.",
+            length(report.offset.mean_m),
+            length(allowed)
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::AreaReport;
+
+    fn report() -> Report {
+        Report {
+            lights: 100,
+            asked_lights: 100,
+            area: AreaReport { visible_m2: 10.0, lights_m2: 10.0, ..AreaReport::default() },
+            ..Report::default()
+        }
+    }
+
+    #[test]
+    fn a_clean_bake_has_nothing_to_change() {
+        let clean = summary(&report(), 0, &[], &[]);
+        assert_eq!((clean.level, clean.changes.len()), (Level::Good, 0));
+    }
+
+    #[test]
+    fn open_lights_are_bad_and_lost_light_is_worth_a_look() {
+        assert_eq!(summary(&report(), 1, &[], &[]).level, Level::Bad);
+        let mut lossy = report();
+        lossy.area.uncovered_m2 = 1.0;
+        let objects =
+            [ObjectFigures { path: "Room/Chair".to_owned(), uncovered_m2: 1.0, ..ObjectFigures::default() }];
+        let lossy = summary(&lossy, 0, &objects, &[]);
+        assert_eq!(lossy.level, Level::Look);
+        assert!(
+            lossy.changes[0].contains("10 %") && lossy.changes[0].contains("Chair"),
+            "{:?}",
+            lossy.changes
+        );
+        let mut deep = report();
+        deep.offset.mean_m = 1.0;
+        assert!(summary(&deep, 0, &[], &[]).changes[0].contains("deep"));
+    }
+}

@@ -1,0 +1,76 @@
+//! From where the page looks at the scene.
+
+use glam::DVec3;
+
+use super::facts::Evidence;
+use crate::scene::{Camera, Projection, Scene, look};
+
+/// Cameras of the file that are shown. More make a longer page.
+const MOST_CAMERAS: usize = 3;
+
+/// Vertical field of view of close-ups, radians, where nothing stands in the way.
+const CLOSE_VIEW: f64 = 0.7;
+
+/// The widest field of view of close-ups, radians: in narrow places the camera stands near and looks wide.
+const WIDEST_VIEW: f64 = 1.9;
+
+/// The first cameras of the scene, and one from outside where all are inside it.
+pub fn cameras(scene: &Scene) -> Vec<Camera> {
+    let mut cameras: Vec<Camera> = scene.cameras_or_default().iter().take(MOST_CAMERAS).cloned().collect();
+    let [low, high] = scene.bounds().unwrap_or_default();
+    let is_inside = |camera: &Camera| {
+        let eye = camera.world_from_view.w_axis.truncate();
+        eye.cmpgt(low).all() && eye.cmplt(high).all()
+    };
+    if cameras.iter().all(is_inside) {
+        cameras.push(scene.overview());
+    }
+    cameras
+}
+
+/// A camera in front of a place, that looks at it against the normal and shows `span` metres of it from bottom to top. It stands
+/// nearer, and looks wider, where something would come between.
+pub fn close_up(evidence: &Evidence, place: DVec3, normal: DVec3, span: f64) -> Camera {
+    let wanted = 0.5 * span / (0.5 * CLOSE_VIEW).tan();
+    let (origin, direction) = (evidence.trace.bvh.leave(place.as_vec3(), normal.as_vec3()), normal.as_vec3());
+    let free = evidence.trace.bvh.hit(origin, direction, wanted as f32);
+    let distance = free.map_or(wanted, |hit| 0.9 * f64::from(hit.distance));
+    let angle = (2.0 * (0.5 * span / distance.max(f64::MIN_POSITIVE)).atan()).min(WIDEST_VIEW);
+    Camera {
+        name: String::from("close-up"),
+        world_from_view: look(place + distance * normal, normal),
+        projection: Projection::Perspective(angle as f32),
+    }
+}
+
+/// Where a point appears, in shares of the picture's width and height from the top left; `None` behind the camera.
+pub fn project(camera: &Camera, aspect: f64, point: DVec3) -> Option<[f64; 2]> {
+    let seen = camera.world_from_view.inverse().transform_point3(point);
+    let half_height = match camera.projection {
+        Projection::Perspective(angle) => (0.5 * f64::from(angle)).tan() * -seen.z,
+        Projection::Orthographic(half_height) => f64::from(half_height),
+    };
+    let ahead = seen.z < 0.0 && half_height > 0.0;
+    let (x, y) = (seen.x / (half_height * aspect), seen.y / half_height);
+    (ahead && x.is_finite() && y.is_finite()).then_some([0.5 + 0.5 * x, 0.5 - 0.5 * y])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_close_ups_place_is_in_its_middle() {
+        let camera = Camera {
+            name: String::new(),
+            world_from_view: look(DVec3::new(1.0, 2.0, 8.0), DVec3::Z),
+            projection: Projection::Perspective(0.7),
+        };
+        let middle = project(&camera, 1.5, DVec3::new(1.0, 2.0, 3.0)).unwrap();
+        assert!((middle[0] - 0.5).abs() + (middle[1] - 0.5).abs() < 1e-12, "{middle:?}");
+        let half = 5.0 * 0.35_f64.tan();
+        let corner = project(&camera, 1.5, DVec3::new(1.0 + 1.5 * half, 2.0 - half, 3.0)).unwrap();
+        assert!((corner[0] - 1.0).abs() + (corner[1] - 1.0).abs() < 1e-6, "{corner:?}");
+        assert_eq!(project(&camera, 1.5, DVec3::new(1.0, 2.0, 9.0)), None, "behind the camera");
+    }
+}
