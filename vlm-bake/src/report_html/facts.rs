@@ -33,6 +33,8 @@ pub struct Evidence<'a> {
     pub correspondence: Correspondence<'a>,
     /// Tags of the surface.
     pub tags: SurfaceTags<'a>,
+    /// The region for which each light stands: that of the first of its points; `None` for a light without points.
+    pub region_of_light: Vec<Option<u32>>,
     /// Per light: it comes out somewhere and no tag keeps it away.
     pub pokes_out: Vec<bool>,
 }
@@ -97,6 +99,23 @@ impl Evidence<'_> {
         View { width, height, facts: gbuffer.points.par_iter().enumerate().map(fact).collect() }
     }
 
+    /// The scene's primitive for which a light stands: that of its region, else of the surface nearest to it.
+    pub fn primitive_of_light(&self, light: usize) -> Option<u32> {
+        if let Some(region) = self.region_of_light.get(light).copied().flatten() {
+            return Some(self.verification.patches.regions[region as usize].primitive);
+        }
+        let centre = self.lights.corners.get(light)?.iter().sum::<DVec3>() / 3.0;
+        let near = self.trace.bvh.closest(centre.as_vec3(), f32::INFINITY, |_| true)?;
+        self.scene.triangle_primitive.get(near.triangle as usize).copied()
+    }
+
+    /// The name of a primitive's material; empty if there is none.
+    pub fn material_name(&self, primitive: u32) -> &str {
+        let primitive = self.scene.primitives.get(primitive as usize);
+        let material = primitive.and_then(|p| self.scene.materials.get(p.material as usize));
+        material.map_or("", |m| &m.name)
+    }
+
     fn fact(&self, point: SurfacePoint, facing: f32) -> Fact {
         let place = self.correspondence.light_at(&point);
         let light = match place {
@@ -120,4 +139,16 @@ impl Evidence<'_> {
             tag: self.asset.tags.get(light).copied().unwrap_or(0),
         }
     }
+}
+
+/// The region of the first point of each light.
+pub fn regions_of_lights(verification: &Verification, lights: usize) -> Vec<Option<u32>> {
+    let mut regions = vec![None; lights];
+    for (point, light) in verification.points.iter().zip(&verification.light_of_point) {
+        if let Some(light) = light {
+            let region = verification.patches.triangle_region[point.triangle as usize];
+            regions[*light as usize].get_or_insert(region);
+        }
+    }
+    regions
 }

@@ -51,10 +51,4 @@ impl WorldLights {
     pub fn area(&self, light: usize) -> f64 {
         0.5 * cross_of(self.corners[light]).length()
     }
-
-    /// Longest edge of a light, metres.
-    pub fn size(&self, light: usize) -> f64 {
-        let [a, b, c] = self.corners[light];
-        a.distance(b).max(b.distance(c)).max(c.distance(a))
-    }
 }

@@ -16,6 +16,7 @@ mod objects;
 mod tag_cost;
 mod text;
 mod places;
+mod advice;
 mod summary;
 mod legend;
 mod tables;
@@ -24,12 +25,16 @@ mod page;
 use glam::DVec3;
 use image::ImageError;
 
+use maud::{Markup, html};
+
 use crate::bake::Bake;
 use crate::scene::{Camera, Scene};
 use crate::shade::TraceScene;
+use advice::Remedies;
 use correspondence::Correspondence;
 use facts::Evidence;
 use lights::WorldLights;
+use objects::{Grouping, ObjectFigures};
 use page::{CloseUp, Gallery, Page};
 use pictures::Subject;
 use places::WorstPlace;
@@ -42,8 +47,12 @@ const PICTURE: [u32; 2] = [480, 360];
 /// Size of close-ups, pixels.
 const CLOSE_UP: [u32; 2] = [320, 240];
 
-/// A close-up shows this many times the size of the light from bottom to top, and of the clearance at least that many.
-const CLOSE_SPAN: [f64; 2] = [4.0, 60.0];
+/// A close-up shows this many times the size of the light and its distance from the place, from bottom to top, and at least that many
+/// times the clearance.
+const CLOSE_SPAN: [f64; 2] = [2.5, 40.0];
+
+/// Up to so many objects are shown by part, too.
+const FEW_OBJECTS: usize = 8;
 
 /// What the page is about.
 #[derive(Clone, Copy)]
@@ -69,6 +78,7 @@ pub fn report_html(subjects: &Subjects) -> Result<String, ImageError> {
     let lights = WorldLights::new(scene, asset);
     let mut pokes_out = vec![false; asset.triangles.len()];
     let open = verification.findings.iter().filter(|f| !f.tagged);
+    let open_depth_m = open.clone().map(|f| f.depth_m).fold(0.0, f64::max);
     for finding in open.clone().filter(|f| f.kind == stand_in::FindingKind::PokesOut) {
         pokes_out[finding.light as usize] = true;
     }
@@ -81,33 +91,53 @@ pub fn report_html(subjects: &Subjects) -> Result<String, ImageError> {
         verification: &verification,
         correspondence: Correspondence::new(scene, &verification, &lights),
         tags: SurfaceTags::new(scene, asset),
+        region_of_light: facts::regions_of_lights(&verification, asset.triangles.len()),
         pokes_out,
     };
     let error_end_m = pictures::error_end(&evidence);
-    let objects = objects::objects(&evidence, &scene.triangle_surfaces());
+    let surfaces = scene.triangle_surfaces();
+    let objects = objects::figures(&evidence, &surfaces, Grouping::Object);
+    let parts = objects::figures(&evidence, &surfaces, Grouping::Part);
+    let remedies = Remedies {
+        required_m: verification.required_m,
+        more_lights: report.asked_lights.saturating_mul(2),
+        can_steer: objects.len() > 1,
+    };
     let places = places::worst_places(&evidence, error_end_m);
-    let summary = summary::summary(report, open, &objects, &places);
+    let summary = summary::summary(report, open, &objects, &places, &remedies);
     let galleries: Result<Vec<Gallery>, ImageError> =
-        views::cameras(scene).iter().map(|camera| gallery(&evidence, camera, error_end_m)).collect();
+        views::cameras(scene, f64::from(PICTURE[0]) / f64::from(PICTURE[1]))
+            .iter()
+            .map(|camera| gallery(&evidence, camera, error_end_m))
+            .collect();
     let close_ups: Result<Vec<CloseUp>, ImageError> =
         places.into_iter().map(|place| close_up(&evidence, place)).collect();
     let page = Page {
         title: subjects.title,
         summary: &summary,
-        reached: tables::asked_and_reached(report, open, &objects),
+        reached: tables::asked_and_reached(report, (open, open_depth_m), &objects),
         galleries: &galleries?,
         size: PICTURE,
         close_ups: &close_ups?,
-        required_m: verification.required_m,
+        remedies: &remedies,
         error_end_m,
         visible_m2: report.area.visible_m2,
-        objects: tables::object_table(&objects),
-        tags: tables::tag_table(&report.tags, &tag_cost::tag_costs(&evidence)),
+        objects: object_tables(&objects, &parts),
+        tags: tables::tag_table(&evidence, &report.tags, &tag_cost::tag_costs(&evidence)),
         sizes: tables::size_table(asset, subjects.file_bytes),
         times: tables::time_table(&report.seconds),
         notes: &report.notes,
     };
     Ok(page.render())
+}
+
+/// Figures by object, and by part where objects are so few that they say little.
+fn object_tables(objects: &[ObjectFigures], parts: &[ObjectFigures]) -> Markup {
+    let is_coarse = objects.len() <= FEW_OBJECTS && parts.len() > objects.len();
+    html! {
+        (tables::object_table("object", objects))
+        @if is_coarse { h3 { "By part" } (tables::object_table("part", parts)) }
+    }
 }
 
 fn gallery(evidence: &Evidence, camera: &Camera, error_end_m: f64) -> Result<Gallery, ImageError> {
@@ -118,8 +148,13 @@ fn gallery(evidence: &Evidence, camera: &Camera, error_end_m: f64) -> Result<Gal
 }
 
 fn close_up(evidence: &Evidence, place: WorstPlace) -> Result<CloseUp, ImageError> {
-    let size = place.light.map_or(0.0, |light| evidence.lights.size(light as usize));
-    let size = if place.light.is_none() { place.amount.sqrt() } else { size };
+    let size = place.light.map_or_else(
+        || place.amount.sqrt(),
+        |light| {
+            let corners = evidence.lights.corners[light as usize];
+            corners.map(|corner| corner.distance(place.place)).into_iter().fold(0.0, f64::max)
+        },
+    );
     let span = (CLOSE_SPAN[0] * size).max(CLOSE_SPAN[1] * evidence.verification.required_m);
     let camera = views::close_up(evidence, place.place, place.normal, span);
     let view = evidence.view(&camera, CLOSE_UP[0], CLOSE_UP[1]);

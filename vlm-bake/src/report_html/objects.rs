@@ -1,9 +1,9 @@
 //! Whether each object's lights return what its surface does: albedo, area, and flux under uniform light.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::facts::Evidence;
-use crate::scene::Surface;
+use crate::scene::{Scene, Surface};
 
 /// Albedo and flux of an object's lights may differ from its surface's by this share.
 pub const ALLOWED: f64 = 0.02;
@@ -11,7 +11,7 @@ pub const ALLOWED: f64 = 0.02;
 /// One object that makes lights, in figures.
 #[derive(Clone, Debug, Default)]
 pub struct ObjectFigures {
-    /// Node path.
+    /// Node path, for parts with material, mesh and primitive.
     pub path: String,
     /// Lights derived from it.
     pub lights: usize,
@@ -77,7 +77,10 @@ impl ObjectFigures {
 #[must_use]
 pub fn percent(share: f64) -> String {
     let percent = 100.0 * share;
-    if percent == 0.0 || percent.abs() >= 10.0 {
+    if percent.abs() < 5e-3 {
+        return if percent == 0.0 { "0 %" } else { "< 0.01 %" }.to_owned();
+    }
+    if percent.abs() >= 10.0 {
         format!("{percent:.0} %")
     } else if percent.abs() >= 0.095 {
         format!("{percent:.1} %")
@@ -86,19 +89,65 @@ pub fn percent(share: f64) -> String {
     }
 }
 
-/// The objects that make lights, in the order of the scene. `surfaces` holds the mean surface of each scene triangle.
-pub fn objects(evidence: &Evidence, surfaces: &[Surface]) -> Vec<ObjectFigures> {
-    let count = evidence.scene.objects.len();
+/// What a row of figures is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Grouping {
+    /// An object: a node with a mesh.
+    Object,
+    /// A part of an object that has one material.
+    Part,
+}
+
+impl Grouping {
+    fn count(self, scene: &Scene) -> usize {
+        match self {
+            Self::Object => scene.objects.len(),
+            Self::Part => scene.primitives.len(),
+        }
+    }
+
+    fn of(self, scene: &Scene, primitive: u32) -> usize {
+        match self {
+            Self::Object => scene.primitives[primitive as usize].object as usize,
+            Self::Part => primitive as usize,
+        }
+    }
+
+    fn name(self, evidence: &Evidence, group: usize) -> String {
+        let scene = evidence.scene;
+        match self {
+            Self::Object => scene.objects[group].path.clone(),
+            Self::Part => {
+                let primitive = &scene.primitives[group];
+                let path = &scene.objects[primitive.object as usize].path;
+                let material = evidence.material_name(group as u32);
+                format!("{path}: {material} ({}/{})", primitive.mesh, primitive.primitive)
+            }
+        }
+    }
+}
+
+/// Sums over a group.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    albedo: DVec3,
+    light_albedo: DVec3,
+    flux: f64,
+    light_flux: f64,
+}
+
+/// The objects or parts that make lights, in the order of the scene. `surfaces` holds the mean surface of each scene triangle.
+pub fn figures(evidence: &Evidence, surfaces: &[Surface], grouping: Grouping) -> Vec<ObjectFigures> {
+    let count = grouping.count(evidence.scene);
     let mut figures = vec![ObjectFigures::default(); count];
-    let mut flux = vec![[0.0_f64; 2]; count];
-    add_surface(evidence, surfaces, &mut figures, &mut flux);
-    add_lights(evidence, &mut figures, &mut flux);
-    for (object, [of_surface, of_lights]) in flux.into_iter().enumerate() {
-        let f = &mut figures[object];
-        f.path.clone_from(&evidence.scene.objects[object].path);
-        f.albedo /= f.visible_m2.max(f64::MIN_POSITIVE) as f32;
-        f.light_albedo /= f.lights_m2.max(f64::MIN_POSITIVE) as f32;
-        f.flux_ratio = if of_surface > 0.0 { of_lights / of_surface } else { 1.0 };
+    let mut sums = vec![Sums::default(); count];
+    add_surface(evidence, surfaces, grouping, &mut figures, &mut sums);
+    add_lights(evidence, grouping, &mut figures, &mut sums);
+    for (group, (f, sums)) in figures.iter_mut().zip(sums).enumerate() {
+        f.path = grouping.name(evidence, group);
+        f.albedo = (sums.albedo / f.visible_m2.max(f64::MIN_POSITIVE)).as_vec3();
+        f.light_albedo = (sums.light_albedo / f.lights_m2.max(f64::MIN_POSITIVE)).as_vec3();
+        f.flux_ratio = if sums.flux > 0.0 { sums.light_flux / sums.flux } else { 1.0 };
     }
     figures.retain(|f| f.visible_m2 > 0.0 || f.lights + f.authored > 0);
     figures
@@ -107,45 +156,54 @@ pub fn objects(evidence: &Evidence, surfaces: &[Surface]) -> Vec<ObjectFigures> 
 fn add_surface(
     evidence: &Evidence,
     surfaces: &[Surface],
+    grouping: Grouping,
     figures: &mut [ObjectFigures],
-    flux: &mut [[f64; 2]],
+    sums: &mut [Sums],
 ) {
-    let patches = &evidence.verification.patches;
-    let object_of =
-        |t: usize| evidence.scene.primitives[patches.region(t).primitive as usize].object as usize;
+    let (patches, scene) = (&evidence.verification.patches, evidence.scene);
     for t in 0..patches.triangles.len() {
-        let object = object_of(t);
+        let primitive = patches.region(t).primitive;
+        let group = grouping.of(scene, primitive);
         let sides = if patches.region(t).two_sided { 2.0 } else { 1.0 };
         let area = sides * patches.area(t);
         let reflectance = surfaces[patches.triangle_source[t] as usize].reflectance();
-        let steering = &evidence.scene.objects[object].steering;
-        figures[object].visible_m2 += area;
-        figures[object].albedo += reflectance * area as f32;
-        flux[object][0] += area * f64::from((reflectance * steering.tint * steering.intensity).element_sum());
+        let steering = &scene.objects[scene.primitives[primitive as usize].object as usize].steering;
+        let strength = steering.tint * steering.intensity;
+        figures[group].visible_m2 += area;
+        sums[group].albedo += reflectance.as_dvec3() * area;
+        sums[group].flux += (reflectance * strength).as_dvec3().element_sum() * area;
     }
     let verification = evidence.verification;
     for (point, light) in verification.points.iter().zip(&verification.light_of_point) {
         if light.is_none() {
-            figures[object_of(point.triangle as usize)].uncovered_m2 += point.area;
+            let primitive = patches.region(point.triangle as usize).primitive;
+            figures[grouping.of(scene, primitive)].uncovered_m2 += point.area;
         }
     }
 }
 
-fn add_lights(evidence: &Evidence, figures: &mut [ObjectFigures], flux: &mut [[f64; 2]]) {
+fn add_lights(evidence: &Evidence, grouping: Grouping, figures: &mut [ObjectFigures], sums: &mut [Sums]) {
     let (lights, asset) = (evidence.lights, evidence.asset);
-    for (l, object) in lights.objects.iter().enumerate() {
-        let Some(object) = object.map(|o| o as usize) else { continue };
+    for l in 0..lights.corners.len() {
+        let group = match (grouping, lights.objects[l]) {
+            (Grouping::Object, Some(object)) => object as usize,
+            (Grouping::Object, None) => continue,
+            (Grouping::Part, _) => {
+                let Some(primitive) = evidence.primitive_of_light(l) else { continue };
+                primitive as usize
+            }
+        };
         if lights.authored[l] {
-            figures[object].authored += 1;
+            figures[group].authored += 1;
             continue;
         }
         let area = lights.area(l);
         let samples = asset.sample_starts[l] as usize..asset.sample_starts[l + 1] as usize;
-        let reflectance: Vec3 = asset.samples[samples].iter().map(|s| s.reflectance).sum();
-        figures[object].lights += 1;
-        figures[object].lights_m2 += area;
-        figures[object].light_albedo += asset.albedo[l] * area as f32;
-        flux[object][1] += area * f64::from(reflectance.element_sum());
+        let reflectance: DVec3 = asset.samples[samples].iter().map(|s| s.reflectance.as_dvec3()).sum();
+        figures[group].lights += 1;
+        figures[group].lights_m2 += area;
+        sums[group].light_albedo += asset.albedo[l].as_dvec3() * area;
+        sums[group].light_flux += reflectance.element_sum() * area;
     }
 }
 
@@ -177,6 +235,9 @@ mod tests {
 
     #[test]
     fn percentages_keep_the_digits_that_matter() {
-        assert_eq!([0.0, 0.0004, 0.0123, 0.25].map(percent), ["0 %", "0.04 %", "1.2 %", "25 %"]);
+        assert_eq!(
+            [-0.0, 1e-6, 0.0004, 0.0123, 0.25].map(percent),
+            ["0 %", "< 0.01 %", "0.04 %", "1.2 %", "25 %"]
+        );
     }
 }

@@ -2,6 +2,7 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+use super::advice::Remedies;
 use super::legend::{caption, legend};
 use super::pictures::Subject;
 use super::places::WorstPlace;
@@ -43,8 +44,8 @@ pub struct Page<'a> {
     pub size: [u32; 2],
     /// Worst places.
     pub close_ups: &'a [CloseUp],
-    /// Required clearance, metres.
-    pub required_m: f64,
+    /// What helps in this scene.
+    pub remedies: &'a Remedies,
     /// Where the ramp of the error ends, metres.
     pub error_end_m: f64,
     /// Area of the surface that reflects, square metres.
@@ -106,7 +107,7 @@ impl Page<'_> {
                     p { (self.summary.text) }
                     @if !self.summary.changes.is_empty() {
                         h3 { "What to change first" }
-                        ol { @for change in &self.summary.changes { li { (change) } } }
+                        ol { @for change in &self.summary.changes { li { (with_code(change)) } } }
                     }
                 }
                 nav {
@@ -119,13 +120,14 @@ impl Page<'_> {
     }
 
     fn pictures(&self) -> Markup {
-        html! { @for gallery in self.galleries {
+        html! { @for (i, gallery) in self.galleries.iter().enumerate() {
             h3 { "Camera " (gallery.camera) }
             div.gallery { @for (subject, picture) in Subject::ALL.into_iter().zip(&gallery.pictures) {
                 @let (title, explanation) = caption(subject);
-                figure {
-                    img src=(picture) width=(self.size[0]) height=(self.size[1]) alt={ (title) ", camera " (gallery.camera) };
-                    div.legend { (legend(subject, self.required_m, self.error_end_m)) }
+                @let id = format!("{}-{i}", caption(subject).0.to_lowercase().replace(' ', "-"));
+                figure id=(id) {
+                    a href={ "#" (id) } title="enlarge" { img src=(picture) width=(self.size[0]) height=(self.size[1]) alt={ (title) ", camera " (gallery.camera) }; }
+                    div.legend { (legend(subject, self.remedies.required_m, self.error_end_m)) }
                     figcaption { b { (title) ". " } (explanation) }
                 }
             } }
@@ -146,11 +148,11 @@ impl Page<'_> {
             div.close { img src=(close_up.picture) alt={ "Close-up of " (place.object) }; (overlay(close_up)) }
             div.what {
                 h3 { (place.title()) @if place.tagged { " " span.badge { "tagged" } } }
-                p.where { (path(&place.object)) br; span.at { "(" (x) ", " (y) ", " (z) ") m" } }
-                p { (place.problem(self.required_m, self.visible_m2))
+                p.where { (path(&place.object)) @if !place.material.is_empty() { ", " (place.material) } br; span.at { "(" (x) ", " (y) ", " (z) ") m" } }
+                p { (place.problem(self.remedies.required_m, self.visible_m2))
                     @if let Some(light) = place.light { " Light " (light) "." }
                     @if place.more > 0 { " " (plural(place.more, "more place", "more places")) " like it near by." } }
-                p.advice { (place.advice(self.required_m)) }
+                p.advice { (with_code(&place.advice(self.remedies))) }
             }
         }
     }
@@ -174,6 +176,13 @@ fn section(id: &str, title: &str, explanation: &str, content: &Markup) -> Markup
     } }
 }
 
+/// Text with what stands between backticks as code.
+fn with_code(text: &str) -> Markup {
+    html! { @for (i, part) in text.split('`').enumerate() {
+        @if i % 2 == 1 { code { (part) } } @else { (part) }
+    } }
+}
+
 /// The outline of the light and a ring round the place.
 fn overlay(close_up: &CloseUp) -> Markup {
     let at = |[x, y]: [f64; 2]| format!("{:.1},{:.1}", 240.0 * x, 180.0 * y);
@@ -181,11 +190,11 @@ fn overlay(close_up: &CloseUp) -> Markup {
     html! {
         svg viewBox="0 0 240 180" preserveAspectRatio="none" aria-hidden="true" {
             @if let Some(points) = outline {
-                polygon.under points=(points);
-                polygon.over points=(points);
+                polygon.under points=(points) {}
+                polygon.over points=(points) {}
             }
             @if let Some([x, y]) = close_up.mark {
-                circle cx=(format!("{:.1}", 240.0 * x)) cy=(format!("{:.1}", 180.0 * y)) r="7";
+                circle cx=(format!("{:.1}", 240.0 * x)) cy=(format!("{:.1}", 180.0 * y)) r="6" {}
             }
         }
     }

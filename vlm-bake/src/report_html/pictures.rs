@@ -88,7 +88,10 @@ fn pixel(evidence: &Evidence, fact: &Fact, subject: Subject, at: [u32; 2], error
         Subject::Clearance => measured(&|| of_clearance(fact, required_m)),
         Subject::Error => measured(&|| ramp((fact.light.distance_m - required_m) / error_end_m)),
         Subject::Tags => measured(&|| of_tags(fact)),
-        Subject::Violations => measured(&|| of_violation(evidence, fact).unwrap_or(PLAIN)),
+        Subject::Violations => match fact.place {
+            Place::MakesNone => lit(MAKES_NONE),
+            _ => lit(of_violation(evidence, fact).unwrap_or(PLAIN)),
+        },
         Subject::Lights => BACKGROUND,
     }
 }

@@ -1,13 +1,11 @@
-//! The places that deserve a look, worst first, and what to do about each.
+//! The places that deserve a look, worst first.
 
 use std::collections::BTreeMap;
 
 use glam::DVec3;
 
 use super::facts::Evidence;
-use super::objects::percent;
 use super::stand_in::FindingKind;
-use super::text::{length, node};
 
 /// Places that are shown.
 const MOST: usize = 10;
@@ -45,6 +43,8 @@ pub struct WorstPlace {
     pub tagged: bool,
     /// Node path.
     pub object: String,
+    /// The material's name.
+    pub material: String,
     /// World space, metres.
     pub place: DVec3,
     /// Unit normal of the surface there.
@@ -55,76 +55,6 @@ pub struct WorstPlace {
     pub light: Option<u32>,
     /// Further troubles of the kind near by.
     pub more: usize,
-}
-
-impl WorstPlace {
-    /// In a few words.
-    pub fn title(&self) -> &'static str {
-        match self.trouble {
-            Trouble::LightsItself => "A light lights its own surface",
-            Trouble::PokesOut => "A light comes out of its object",
-            Trouble::TooThin => "Nothing to hide a light behind",
-            Trouble::Uncovered => "No light stands for this surface",
-            Trouble::Far => "Light far from its surface",
-        }
-    }
-
-    /// What is wrong, with figures. `required_m` is the clearance, `visible_m2` the area of the scene.
-    pub fn problem(&self, required_m: f64, visible_m2: f64) -> String {
-        let by = length(self.amount);
-        match self.trouble {
-            Trouble::LightsItself => {
-                format!(
-                    "It would have to lie {by} deeper to keep the required {} behind it.",
-                    length(required_m)
-                )
-            }
-            Trouble::PokesOut => format!("It shows on another side, by {by}."),
-            Trouble::TooThin => {
-                format!("The surface is a sheet or thinner than the lights need; they come {by} too near.")
-            }
-            Trouble::Uncovered => format!(
-                "{:.3} m², {} of the scene's surface, bounce no light: too small or too isolated for the budget.",
-                self.amount,
-                percent(self.amount / visible_m2.max(f64::MIN_POSITIVE))
-            ),
-            Trouble::Far => format!(
-                "It lies {by} farther from here than the clearance asks: decimation cut this shape away, or the light sank."
-            ),
-        }
-    }
-
-    /// What to do about it.
-    pub fn advice(&self, required_m: f64) -> String {
-        let name = node(&self.object);
-        let thick = length(4.0 * required_m);
-        match (self.trouble, self.tagged) {
-            (Trouble::LightsItself | Trouble::PokesOut, true) => {
-                "A tag already keeps this light off its own surface, so nothing shines through. To be rid of the tag, smooth or simplify the \
-                 shape here, or ask for more lights.".to_owned()
-            }
-            (Trouble::LightsItself, false) => format!(
-                "Raise extras.vlm.density on {name} (try 2) or ask for more lights; if it stays, set extras.vlm.tag on it."
-            ),
-            (Trouble::PokesOut, false) => format!(
-                "Make {name} at least {thick} thick here, or raise extras.vlm.density on it; if it stays, set extras.vlm.tag on it."
-            ),
-            (Trouble::TooThin, true) => format!(
-                "Fine as it is if {name} is meant to be a sheet: its tag keeps its lights off it. Otherwise close it into a solid at \
-                 least {thick} thick, single-sided."
-            ),
-            (Trouble::TooThin, false) => format!(
-                "Close {name} into a solid at least {thick} thick, or set extras.vlm.tag on it; set extras.vlm.exclude if its light does \
-                 not matter."
-            ),
-            (Trouble::Uncovered, _) => format!(
-                "If its light matters, raise extras.vlm.density on {name} or join it to the surface that it touches; if not, leave it."
-            ),
-            (Trouble::Far, _) => format!(
-                "Compare the pictures of the scene and of the lights: if the shape matters, raise extras.vlm.density on {name}."
-            ),
-        }
-    }
 }
 
 /// The places to show. `error_end_m` is what all but a hundredth of the surface's distances stay below, metres.
@@ -174,6 +104,7 @@ fn findings(evidence: &Evidence) -> Vec<WorstPlace> {
         },
         tagged: f.tagged,
         object: f.object.clone(),
+        material: material_of_light(evidence, f.light),
         place: f.place,
         normal: f.normal,
         amount: f.depth_m,
@@ -183,11 +114,16 @@ fn findings(evidence: &Evidence) -> Vec<WorstPlace> {
     evidence.verification.findings.iter().map(place).collect()
 }
 
-/// The path of the object of a triangle of the patches.
-fn path_of(evidence: &Evidence, triangle: u32) -> String {
-    let region = evidence.verification.patches.region(triangle as usize);
-    let object = evidence.scene.primitives[region.primitive as usize].object;
-    evidence.scene.objects[object as usize].path.clone()
+fn material_of_light(evidence: &Evidence, light: u32) -> String {
+    let primitive = evidence.primitive_of_light(light as usize);
+    primitive.map_or_else(String::new, |p| evidence.material_name(p).to_owned())
+}
+
+/// The paths of the object of a triangle of the patches, and its material's name.
+fn names_of(evidence: &Evidence, triangle: u32) -> (String, String) {
+    let primitive = evidence.verification.patches.region(triangle as usize).primitive;
+    let object = evidence.scene.primitives[primitive as usize].object;
+    (evidence.scene.objects[object as usize].path.clone(), evidence.material_name(primitive).to_owned())
 }
 
 /// One place per region with uncovered surface: its uncovered point nearest to the mean of them.
@@ -208,10 +144,12 @@ fn uncovered(evidence: &Evidence) -> Vec<WorstPlace> {
         let mean = points().map(|p| p.position).sum::<DVec3>() / points().count() as f64;
         let away = |p: &&crate::surface::SurfacePoint| p.position.distance_squared(mean);
         let nearest = points().min_by(|a, b| away(a).total_cmp(&away(b)))?;
+        let (object, material) = names_of(evidence, nearest.triangle);
         (amount >= LEAST_UNCOVERED * visible).then(|| WorstPlace {
             trouble: Trouble::Uncovered,
             tagged: false,
-            object: path_of(evidence, nearest.triangle),
+            object,
+            material,
             place: nearest.position,
             normal: nearest.normal,
             amount,
@@ -231,10 +169,11 @@ fn far(evidence: &Evidence, error_end_m: f64) -> Vec<WorstPlace> {
         let light = (*light)?;
         let fact = evidence.light_fact(light as usize, point.position, point.normal);
         let amount = fact.distance_m - verification.required_m;
-        (amount > least).then(|| WorstPlace {
+        (amount > least).then(|| names_of(evidence, point.triangle)).map(|(object, material)| WorstPlace {
             trouble: Trouble::Far,
             tagged: false,
-            object: path_of(evidence, point.triangle),
+            object,
+            material,
             place: point.position,
             normal: point.normal,
             amount,
@@ -246,14 +185,15 @@ fn far(evidence: &Evidence, error_end_m: f64) -> Vec<WorstPlace> {
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
 
-    fn at(x: f64, amount: f64) -> WorstPlace {
+    pub fn at(x: f64, amount: f64) -> WorstPlace {
         WorstPlace {
             trouble: Trouble::LightsItself,
             tagged: false,
             object: "Room/Wall".to_owned(),
+            material: "brick".to_owned(),
             place: DVec3::X * x,
             normal: DVec3::Y,
             amount,
@@ -268,12 +208,5 @@ mod tests {
         assert_eq!(found.iter().map(|p| (p.amount, p.more)).collect::<Vec<_>>(), [(3.0, 1), (2.0, 0)]);
         let other = WorstPlace { object: "Room/Floor".to_owned(), ..at(0.5, 2.5) };
         assert_eq!(merged(vec![at(0.5, 3.0), other], 1.0).len(), 2, "another object is another place");
-    }
-
-    #[test]
-    fn advice_names_the_object_and_differs_with_the_tag() {
-        let open = at(0.0, 0.01);
-        assert!(open.advice(1e-3).contains("density on Wall"), "{}", open.advice(1e-3));
-        assert_ne!(open.advice(1e-3), WorstPlace { tagged: true, ..open.clone() }.advice(1e-3));
     }
 }

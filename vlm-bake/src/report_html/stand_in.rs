@@ -39,7 +39,6 @@ pub enum FindingKind {
     /// It lights the surface that it stands for.
     LightsItself,
     /// It comes out on another side.
-    #[expect(dead_code, reason = "today's stages do not tell it from an asset")]
     PokesOut,
     /// Nothing lies behind its surface.
     TooThin,

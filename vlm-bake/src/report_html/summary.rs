@@ -1,5 +1,6 @@
 //! The verdict in plain words, and what to change first.
 
+use super::advice::Remedies;
 use super::objects::{ObjectFigures, percent};
 use super::places::{Trouble, WorstPlace};
 use super::text::{area, length, node, plural};
@@ -41,8 +42,14 @@ pub struct Summary {
 }
 
 /// Sums up a bake. `open` is the number of lights that fail and that no tag keeps away.
-pub fn summary(report: &Report, open: usize, objects: &[ObjectFigures], places: &[WorstPlace]) -> Summary {
-    let changes = changes(report, open, objects, places);
+pub fn summary(
+    report: &Report,
+    open: usize,
+    objects: &[ObjectFigures],
+    places: &[WorstPlace],
+    remedies: &Remedies,
+) -> Summary {
+    let changes = changes(report, open, objects, places, remedies);
     let (level, headline) = match (open, changes.len()) {
         (0, 0) => (Level::Good, "Fine: nothing to change".to_owned()),
         (0, _) => (
@@ -73,10 +80,16 @@ pub fn summary(report: &Report, open: usize, objects: &[ObjectFigures], places: 
     Summary { level, headline, text, changes }
 }
 
-fn changes(report: &Report, open: usize, objects: &[ObjectFigures], places: &[WorstPlace]) -> Vec<String> {
+fn changes(
+    report: &Report,
+    open: usize,
+    objects: &[ObjectFigures],
+    places: &[WorstPlace],
+    remedies: &Remedies,
+) -> Vec<String> {
     let found = [
-        open_lights(report, open, places),
-        uncovered(report, objects),
+        open_lights(open, places, remedies),
+        uncovered(report, objects, remedies),
         missing(objects),
         tagged(report),
         budget(report),
@@ -85,27 +98,26 @@ fn changes(report: &Report, open: usize, objects: &[ObjectFigures], places: &[Wo
     found.into_iter().flatten().take(MOST).collect()
 }
 
-fn open_lights(report: &Report, open: usize, places: &[WorstPlace]) -> Option<String> {
+fn open_lights(open: usize, places: &[WorstPlace], remedies: &Remedies) -> Option<String> {
     let worst = places.iter().find(|p| !p.tagged && p.trouble <= Trouble::TooThin).filter(|_| open > 0)?;
     Some(format!(
         "{} at {}: see the first of the worst places. {}",
         worst.title(),
         node(&worst.object),
-        worst.advice(report.clearance.required_m)
+        worst.advice(remedies)
     ))
 }
 
-fn uncovered(report: &Report, objects: &[ObjectFigures]) -> Option<String> {
+fn uncovered(report: &Report, objects: &[ObjectFigures], remedies: &Remedies) -> Option<String> {
     let share = report.area.uncovered_m2 / report.area.visible_m2.max(f64::MIN_POSITIVE);
     let most = objects.iter().max_by(|a, b| a.uncovered_m2.total_cmp(&b.uncovered_m2))?;
     (share > UNCOVERED).then(|| {
         format!(
-            "{} of the surface bounces no light, most of it ({}) on {}: ask for more lights (--lights {}), or raise \
-             extras.vlm.density on what matters.",
+            "{} of the surface bounces no light, most of it ({}) on {}: {}.",
             percent(share),
             area(most.uncovered_m2),
             node(&most.path),
-            2 * report.asked_lights
+            remedies.finer(node(&most.path))
         )
     })
 }
@@ -159,8 +171,8 @@ fn offset(report: &Report) -> Option<String> {
     let allowed = OFFSET * (report.decimation.error_m + report.clearance.required_m);
     (report.offset.mean_m > allowed).then(|| {
         format!(
-            "Lights lie {} deep on average, where {} would do: hollows and folds push them down. More lights let them follow the \
-             surface.",
+            "Lights lie {} deep on average, where {} would do: sharp corners, hollows and folds push them down. More lights follow the \
+             surface more closely.",
             length(report.offset.mean_m),
             length(allowed)
         )
@@ -171,6 +183,8 @@ fn offset(report: &Report) -> Option<String> {
 mod tests {
     use super::*;
     use crate::report::AreaReport;
+
+    const REMEDIES: Remedies = Remedies { required_m: 1e-3, more_lights: 200, can_steer: true };
 
     fn report() -> Report {
         Report {
@@ -183,18 +197,18 @@ mod tests {
 
     #[test]
     fn a_clean_bake_has_nothing_to_change() {
-        let clean = summary(&report(), 0, &[], &[]);
+        let clean = summary(&report(), 0, &[], &[], &REMEDIES);
         assert_eq!((clean.level, clean.changes.len()), (Level::Good, 0));
     }
 
     #[test]
     fn open_lights_are_bad_and_lost_light_is_worth_a_look() {
-        assert_eq!(summary(&report(), 1, &[], &[]).level, Level::Bad);
+        assert_eq!(summary(&report(), 1, &[], &[], &REMEDIES).level, Level::Bad);
         let mut lossy = report();
         lossy.area.uncovered_m2 = 1.0;
         let objects =
             [ObjectFigures { path: "Room/Chair".to_owned(), uncovered_m2: 1.0, ..ObjectFigures::default() }];
-        let lossy = summary(&lossy, 0, &objects, &[]);
+        let lossy = summary(&lossy, 0, &objects, &[], &REMEDIES);
         assert_eq!(lossy.level, Level::Look);
         assert!(
             lossy.changes[0].contains("10 %") && lossy.changes[0].contains("Chair"),
@@ -203,6 +217,6 @@ mod tests {
         );
         let mut deep = report();
         deep.offset.mean_m = 1.0;
-        assert!(summary(&deep, 0, &[], &[]).changes[0].contains("deep"));
+        assert!(summary(&deep, 0, &[], &[], &REMEDIES).changes[0].contains("deep"));
     }
 }

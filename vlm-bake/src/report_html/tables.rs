@@ -6,6 +6,7 @@ use maud::{Markup, html};
 use vlm_format::VlmAsset;
 
 use super::colour::{css, encode, of_tag};
+use super::facts::Evidence;
 use super::objects::{ALLOWED, ObjectFigures, percent};
 use super::text::{area, bytes, count, length};
 use crate::report::Report;
@@ -15,114 +16,121 @@ use crate::tag::{TagReason, TagReport};
 const MOST_ROWS: usize = 40;
 
 /// A row of the first table.
+#[derive(Clone, Default)]
 struct Reached {
     what: &'static str,
+    /// Empty where nothing was asked; then `good` says nothing.
     asked: String,
     reached: String,
     good: bool,
-    why: String,
+    note: String,
 }
 
-/// Asked against reached. `open` is the number of lights that fail untagged.
-pub fn asked_and_reached(report: &Report, open: usize, objects: &[ObjectFigures]) -> Markup {
+/// Asked against reached. `open` holds the number of lights that fail untagged, and how far the worst of them would have to move.
+pub fn asked_and_reached(report: &Report, open: (usize, f64), objects: &[ObjectFigures]) -> Markup {
+    let rows = [&bake_rows(report)[..], &check_rows(report, open, objects)[..]].concat();
     html! {
-        div.scroll { table {
-            thead { tr { th {} th.n { "asked" } th.n { "reached" } th {} th.note { "note" } } }
-            tbody { @for row in rows(report, open, objects) {
+        div.scroll { table.reached {
+            thead { tr { th {} th.n { "asked" } th.n { "reached" } th {} } }
+            tbody { @for row in rows {
                 tr {
-                    th scope="row" { (row.what) }
+                    th scope="row" { (row.what) @if !row.note.is_empty() { span.note { (row.note) } } }
                     td.n { (row.asked) } td.n { (row.reached) }
-                    td { @if row.good { span.ok { "ok" } } @else { span.miss { "look" } } }
-                    td.note { (row.why) }
+                    td { @if row.asked.is_empty() {} @else if row.good { span.ok { "ok" } } @else { span.miss { "look" } } }
                 }
             } }
         } }
     }
 }
 
-fn rows(report: &Report, open: usize, objects: &[ObjectFigures]) -> Vec<Reached> {
-    let share = |part: f64, whole: f64| part.max(0.0) / whole.max(f64::MIN_POSITIVE);
-    let row = |what, asked: String, reached: String, good, why: &str| Reached {
-        what,
-        asked,
-        reached,
-        good,
-        why: why.to_owned(),
-    };
+/// Rows about what the bake made.
+fn bake_rows(report: &Report) -> [Reached; 5] {
     let offset_limit = 1.5 * (report.decimation.error_m + report.clearance.required_m);
-    let tagged = share(report.area.tagged_m2, report.area.lights_m2);
-    let uncovered = share(report.area.uncovered_m2, report.area.visible_m2);
-    let missed = objects.iter().filter(|o| !o.why_missed().is_empty()).count();
-    vec![
-        row(
-            "Lights",
-            count(report.asked_lights.into()),
-            count(report.lights as u64),
-            report.missed_because.is_empty(),
-            &report.missed_because,
-        ),
-        row(
-            "Faces after decimation",
-            format!("≤ {}", count(report.decimation.asked as u64)),
-            count(report.decimation.reached as u64),
-            report.decimation.reached <= report.decimation.asked,
-            "the rest of the lights divides large faces",
-        ),
-        row(
-            "Decimation error",
-            "–".to_owned(),
-            length(report.decimation.error_m),
-            true,
-            "distance at the worst collapse",
-        ),
-        row(
-            "Lights that light themselves",
-            "0".to_owned(),
-            count(open as u64),
-            open == 0,
-            "neither mended nor tagged",
-        ),
-        row(
-            "Clearance",
-            length(report.clearance.required_m),
-            length(report.clearance.required_m - report.clearance.worst_m),
-            report.clearance.violations == 0,
-            "least depth behind the surface where no tag helps",
-        ),
-        row(
-            "Mean offset",
-            format!("≤ {}", length(offset_limit)),
-            length(report.offset.mean_m),
-            report.offset.mean_m <= offset_limit,
-            "1.5 × (decimation error + clearance)",
-        ),
-        row("Greatest offset", "–".to_owned(), length(report.offset.max_m), true, ""),
-        row(
-            "Tagged lights",
-            "≤ 3 %".to_owned(),
-            percent(tagged),
-            tagged <= 0.03,
-            "of the lights' area; sheets are tagged whole",
-        ),
-        row(
-            "Surface without light",
-            "≤ 1 %".to_owned(),
-            percent(uncovered),
-            uncovered <= 0.01,
-            "of the surface that reflects",
-        ),
-        row(
-            "Objects off by more than 2 %",
-            "0".to_owned(),
-            count(missed as u64),
-            missed == 0,
-            "in albedo or flux, see below",
-        ),
+    let (asked, reached) = (report.decimation.asked as u64, report.decimation.reached as u64);
+    [
+        Reached {
+            what: "Lights",
+            asked: count(report.asked_lights.into()),
+            reached: count(report.lights as u64),
+            good: report.missed_because.is_empty(),
+            note: report.missed_because.clone(),
+        },
+        Reached {
+            what: "Faces after decimation",
+            asked: format!("≤ {}", count(asked)),
+            reached: count(reached),
+            good: reached <= asked,
+            note: "the rest of the lights divides large faces".to_owned(),
+        },
+        Reached {
+            what: "Decimation error",
+            reached: length(report.decimation.error_m),
+            note: "distance at the worst collapse".to_owned(),
+            ..Reached::default()
+        },
+        Reached {
+            what: "Mean offset",
+            asked: format!("≤ {}", length(offset_limit)),
+            reached: length(report.offset.mean_m),
+            good: report.offset.mean_m <= offset_limit,
+            note: "at most 1.5 × (decimation error + clearance)".to_owned(),
+        },
+        Reached { what: "Greatest offset", reached: length(report.offset.max_m), ..Reached::default() },
     ]
 }
 
-/// Albedo and flux per object; those that miss the rule come first, the largest first.
-pub fn object_table(objects: &[ObjectFigures]) -> Markup {
+/// Rows about what the check found.
+fn check_rows(report: &Report, open: (usize, f64), objects: &[ObjectFigures]) -> [Reached; 5] {
+    let share = |part: f64, whole: f64| part.max(0.0) / whole.max(f64::MIN_POSITIVE);
+    let tagged = share(report.area.tagged_m2, report.area.lights_m2);
+    let uncovered = share(report.area.uncovered_m2, report.area.visible_m2);
+    let missed = objects.iter().filter(|o| !o.why_missed().is_empty()).count();
+    let (failing, depth_m) = open;
+    [
+        Reached {
+            what: "Lights that shine where they must not",
+            asked: "0".to_owned(),
+            reached: count(failing as u64),
+            good: failing == 0,
+            note: "neither mended nor tagged".to_owned(),
+        },
+        Reached {
+            what: "Clearance",
+            asked: format!("≥ {}", length(report.clearance.required_m)),
+            reached: format!(
+                "{} {}",
+                if failing == 0 { "≥" } else { "" },
+                length(report.clearance.required_m - depth_m)
+            ),
+            good: failing == 0,
+            note: "least depth behind the surface, where no tag helps".to_owned(),
+        },
+        Reached {
+            what: "Tagged lights",
+            asked: "≤ 3 %".to_owned(),
+            reached: percent(tagged),
+            good: tagged <= 0.03,
+            note: "of the lights' area; sheets are tagged whole".to_owned(),
+        },
+        Reached {
+            what: "Surface without light",
+            asked: "≤ 1 %".to_owned(),
+            reached: percent(uncovered),
+            good: uncovered <= 0.01,
+            note: "of the surface that reflects".to_owned(),
+        },
+        Reached {
+            what: "Objects off by more than 2 %",
+            asked: "0".to_owned(),
+            reached: count(missed as u64),
+            good: missed == 0,
+            note: "in albedo or flux, see below".to_owned(),
+        },
+    ]
+}
+
+/// Albedo and flux per object or part, which `what` names; those that miss the rule come first, the largest first.
+pub fn object_table(what: &str, objects: &[ObjectFigures]) -> Markup {
     let mut order: Vec<&ObjectFigures> = objects.iter().collect();
     order.sort_by(|a, b| {
         let missed = |o: &ObjectFigures| !o.why_missed().is_empty();
@@ -132,12 +140,12 @@ pub fn object_table(objects: &[ObjectFigures]) -> Markup {
     html! {
         div.scroll { table {
             thead { tr {
-                th { "object" } th.n { "lights" } th.n { "surface" } th.n { "without light" } th.n { "area of lights" }
-                th { "albedo" } th.n { "albedo off by" } th.n { "flux" } th.note { "why" }
+                th { (what) } th.n { "lights" } th.n { "surface" } th.n { "without light" } th.n { "area of lights" }
+                th { "albedo" } th.n { "off by" } th.n { "flux" }
             } }
             tbody { @for o in order.iter().take(MOST_ROWS) { (object_row(o)) } }
         } }
-        @if rest > 0 { p.rest { (count(rest as u64)) " more objects, smaller or within the rule." } }
+        @if rest > 0 { p.rest { (count(rest as u64)) " more, smaller or within the rule." } }
     }
 }
 
@@ -147,7 +155,7 @@ fn object_row(o: &ObjectFigures) -> Markup {
     let swatches = [o.albedo, o.light_albedo].map(|albedo| css(encode(albedo)));
     html! {
         tr {
-            th.path scope="row" { (path(&o.path)) }
+            th.path scope="row" { (path(&o.path)) @if !why.is_empty() { span.note { (why) } } }
             td.n { (count((o.lights + o.authored) as u64)) }
             td.n { (area(o.visible_m2)) }
             td.n { (percent(o.uncovered_m2 / o.visible_m2.max(f64::MIN_POSITIVE))) }
@@ -158,13 +166,12 @@ fn object_row(o: &ObjectFigures) -> Markup {
             } }
             td class=(off(o.albedo_error())) { (percent(o.albedo_error())) }
             td class=(off(o.flux_ratio - 1.0)) { (percent(o.flux_ratio)) }
-            td.note { (why) }
         }
     }
 }
 
 /// The tags, the largest first. `costs` holds the share of light that each takes from its surface.
-pub fn tag_table(tags: &[TagReport], costs: &BTreeMap<u32, f64>) -> Markup {
+pub fn tag_table(evidence: &Evidence, tags: &[TagReport], costs: &BTreeMap<u32, f64>) -> Markup {
     if tags.is_empty() {
         return html! { p { "None: every light is hidden behind its surface." } };
     }
@@ -174,14 +181,14 @@ pub fn tag_table(tags: &[TagReport], costs: &BTreeMap<u32, f64>) -> Markup {
     html! {
         div.scroll { table {
             thead { tr {
-                th.n { "tag" } th { "object" } th { "mesh / primitive" } th { "reason" } th.n { "lights" } th.n { "area" }
+                th.n { "tag" } th { "object" } th { "material, mesh / primitive" } th { "reason" } th.n { "lights" } th.n { "area" }
                 th.n { "light lost" }
             } }
             tbody { @for t in order.iter().take(MOST_ROWS) {
                 tr {
                     td.n { span.swatch style={ "background:" (css(of_tag(t.tag))) } {} (t.tag) }
                     th.path scope="row" { (path(&t.object)) }
-                    td { (t.mesh) " / " (t.primitive) }
+                    td { (material(evidence, t)) ", " (t.mesh) " / " (t.primitive) }
                     td { (reason(t.reason)) }
                     td.n { (count(t.lights as u64)) }
                     td.n { (area(t.area_m2)) }
@@ -191,6 +198,13 @@ pub fn tag_table(tags: &[TagReport], costs: &BTreeMap<u32, f64>) -> Markup {
         } }
         @if rest > 0 { p.rest { (count(rest as u64)) " more tags, smaller ones." } }
     }
+}
+
+/// The name of the material of a tagged primitive.
+fn material<'a>(evidence: &'a Evidence, tag: &TagReport) -> &'a str {
+    let primitives = &evidence.scene.primitives;
+    let found = primitives.iter().position(|p| (p.mesh, p.primitive) == (tag.mesh, tag.primitive));
+    found.map_or("", |p| evidence.material_name(p as u32))
 }
 
 fn reason(reason: TagReason) -> &'static str {

@@ -33,13 +33,12 @@ pub fn tag_costs(evidence: &Evidence) -> BTreeMap<u32, f64> {
     let centre = evidence.scene.bounds().map_or(DVec3::ZERO, |[low, high]| 0.5 * (low + high));
     let geometry: Vec<LightGeometry> =
         evidence.lights.corners.iter().map(|c| LightGeometry::new(c.map(|p| p - centre))).collect();
-    let regions = regions_of_lights(evidence);
     let cost = |(tag, points): (u32, Vec<usize>)| {
         let every = points.len().div_ceil(each);
         let [lost, all] = points
             .into_par_iter()
             .step_by(every)
-            .map(|p| light_on(evidence, &geometry, &regions, centre, p, tag))
+            .map(|p| light_on(evidence, &geometry, centre, p, tag))
             .collect::<Vec<_>>()
             .into_iter()
             .fold([0.0, 0.0], |[lost, all], [l, a]| [lost + l, all + a]);
@@ -52,7 +51,6 @@ pub fn tag_costs(evidence: &Evidence) -> BTreeMap<u32, f64> {
 fn light_on(
     evidence: &Evidence,
     geometry: &[LightGeometry],
-    regions: &[Option<u32>],
     centre: DVec3,
     point: usize,
     tag: u32,
@@ -62,7 +60,7 @@ fn light_on(
     let (x, n): (Vec3, Vec3) = ((point.position - centre).as_vec3(), point.normal.as_vec3());
     let (mut lost, mut all) = (0.0, 0.0);
     for (l, light) in geometry.iter().enumerate() {
-        if regions[l] == own {
+        if evidence.region_of_light[l] == own {
             continue;
         }
         let strength = evidence.asset.albedo[l].element_sum();
@@ -73,17 +71,4 @@ fn light_on(
         }
     }
     [lost, all]
-}
-
-/// The region for which each light stands: that of the first of its points.
-fn regions_of_lights(evidence: &Evidence) -> Vec<Option<u32>> {
-    let verification = evidence.verification;
-    let mut regions = vec![None; evidence.lights.corners.len()];
-    for (point, light) in verification.points.iter().zip(&verification.light_of_point) {
-        if let Some(light) = light {
-            let region = verification.patches.triangle_region[point.triangle as usize];
-            regions[*light as usize].get_or_insert(region);
-        }
-    }
-    regions
 }

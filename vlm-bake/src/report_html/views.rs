@@ -14,16 +14,23 @@ const CLOSE_VIEW: f64 = 0.7;
 /// The widest field of view of close-ups, radians: in narrow places the camera stands near and looks wide.
 const WIDEST_VIEW: f64 = 1.9;
 
-/// The first cameras of the scene, and one from outside where all are inside it.
-pub fn cameras(scene: &Scene) -> Vec<Camera> {
+/// The first cameras of the scene, and one from outside where all are inside it. `aspect` is the pictures' width over their height.
+pub fn cameras(scene: &Scene, aspect: f64) -> Vec<Camera> {
+    let overview = scene.overview(aspect);
     let mut cameras: Vec<Camera> = scene.cameras_or_default().iter().take(MOST_CAMERAS).cloned().collect();
+    // The default camera leaves room for square pictures.
+    if scene.cameras.is_empty()
+        && cameras.iter().all(|c| c.world_from_view.z_axis == overview.world_from_view.z_axis)
+    {
+        return vec![overview];
+    }
     let [low, high] = scene.bounds().unwrap_or_default();
     let is_inside = |camera: &Camera| {
         let eye = camera.world_from_view.w_axis.truncate();
         eye.cmpgt(low).all() && eye.cmplt(high).all()
     };
     if cameras.iter().all(is_inside) {
-        cameras.push(scene.overview());
+        cameras.push(overview);
     }
     cameras
 }

@@ -97,9 +97,25 @@ impl Scene {
         notes
     }
 
-    /// A camera outside that frames the scene along a diagonal, from the front right and above.
-    pub(crate) fn overview(&self) -> Camera {
-        Camera { name: String::from("overview"), ..self.default_camera(Setting::Object) }
+    /// A camera outside that frames the scene's vertices along a diagonal, from the front right and above, in a picture of this
+    /// width over height.
+    pub(crate) fn overview(&self, aspect: f64) -> Camera {
+        let [minimum, maximum] = self.framed_box();
+        let (centre, backward) = (0.5 * (minimum + maximum).as_dvec3(), view_direction(Setting::Object));
+        let view = look(centre, backward);
+        let (right, up) = (view.x_axis.truncate(), view.y_axis.truncate());
+        let inside = |p: &&Vec3| p.cmpge(minimum).all() && p.cmple(maximum).all();
+        let needed = |p: &Vec3| {
+            let q = p.as_dvec3() - centre;
+            let across = (q.dot(right).abs() / aspect).max(q.dot(up).abs());
+            q.dot(backward) + across / (0.5 * f64::from(OUTSIDE_VIEW)).tan()
+        };
+        let distance = 1.05 * self.positions.iter().filter(inside).map(needed).fold(0.0, f64::max);
+        Camera {
+            name: String::from("overview"),
+            world_from_view: look(centre + distance * backward, backward),
+            projection: Projection::Perspective(OUTSIDE_VIEW),
+        }
     }
 
     /// A light shines or a surface glows.

@@ -1,0 +1,116 @@
+//! What is wrong at a place and what to do about it, in words.
+
+use super::objects::percent;
+use super::places::{Trouble, WorstPlace};
+use super::text::{length, node};
+
+impl WorstPlace {
+    /// In a few words.
+    pub fn title(&self) -> &'static str {
+        match self.trouble {
+            Trouble::LightsItself => "A light lights its own surface",
+            Trouble::PokesOut => "A light comes out of its object",
+            Trouble::TooThin => "Nothing to hide a light behind",
+            Trouble::Uncovered => "No light stands for this surface",
+            Trouble::Far => "Light far from its surface",
+        }
+    }
+
+    /// What is wrong, with figures. `required_m` is the clearance, `visible_m2` the area of the scene.
+    pub fn problem(&self, required_m: f64, visible_m2: f64) -> String {
+        let by = length(self.amount);
+        match self.trouble {
+            Trouble::LightsItself => {
+                format!(
+                    "It would have to lie {by} deeper to keep the required {} behind it.",
+                    length(required_m)
+                )
+            }
+            Trouble::PokesOut => format!("It shows on another side, by {by}."),
+            Trouble::TooThin => {
+                format!("The surface is a sheet or thinner than the lights need; they come {by} too near.")
+            }
+            Trouble::Uncovered => format!(
+                "{:.3} m², {} of the scene's surface, bounce no light: too small or too isolated for the budget.",
+                self.amount,
+                percent(self.amount / visible_m2.max(f64::MIN_POSITIVE))
+            ),
+            Trouble::Far => format!(
+                "It lies {by} farther from here than the clearance asks: decimation cut this shape away, or the light sank."
+            ),
+        }
+    }
+
+    /// What to do about it.
+    pub fn advice(&self, remedies: &Remedies) -> String {
+        let name = node(&self.object);
+        let thick = length(4.0 * remedies.required_m);
+        let finer = remedies.finer(name);
+        match (self.trouble, self.tagged) {
+            (Trouble::LightsItself | Trouble::PokesOut, true) => {
+                "A tag already keeps this light off its own surface, so nothing shines through. To be rid of the tag, smooth or simplify the \
+                 shape here, or ask for more lights.".to_owned()
+            }
+            (Trouble::LightsItself, false) => {
+                format!("To mend it, {finer}. If it stays, set `extras.vlm.tag` on {name}.")
+            }
+            (Trouble::PokesOut, false) => format!(
+                "Make {name} at least {thick} thick here, or {finer}. If it stays, set `extras.vlm.tag` on it."
+            ),
+            (Trouble::TooThin, true) => format!(
+                "Fine as it is if {name} is meant to be a sheet: its tag keeps its lights off it. Otherwise close it into a solid at \
+                 least {thick} thick, single-sided."
+            ),
+            (Trouble::TooThin, false) => format!(
+                "Close {name} into a solid at least {thick} thick, or set `extras.vlm.tag` on it; set `extras.vlm.exclude` if its light does \
+                 not matter."
+            ),
+            (Trouble::Uncovered, _) => format!(
+                "If its light matters, {finer}, or join it to the surface that it touches. If not, leave it."
+            ),
+            (Trouble::Far, _) => format!(
+                "Compare the pictures of the scene and of the lights; if the shape matters, {finer}."
+            ),
+        }
+    }
+}
+
+/// What helps in this scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Remedies {
+    /// Required clearance, metres.
+    pub required_m: f64,
+    /// A budget to try next.
+    pub more_lights: u32,
+    /// The scene has several objects, so that one of them may get more of the budget.
+    pub can_steer: bool,
+}
+
+impl Remedies {
+    /// How to get more lights onto an object.
+    pub fn finer(&self, name: &str) -> String {
+        let more = self.more_lights;
+        if self.can_steer {
+            format!("raise `extras.vlm.density` on {name} (try 2), or bake with `--lights {more}`")
+        } else {
+            format!("bake with `--lights {more}`")
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report_html::places::tests::at;
+
+    #[test]
+    fn advice_names_the_object_and_differs_with_the_tag() {
+        let open = at(0.0, 0.01);
+        let several = Remedies { required_m: 1e-3, more_lights: 920, can_steer: true };
+        let advice = open.advice(&several);
+        assert!(advice.contains("density` on Wall") && advice.contains("920"), "{advice}");
+        assert_ne!(advice, WorstPlace { tagged: true, ..open.clone() }.advice(&several));
+        let alone = open.advice(&Remedies { can_steer: false, ..several });
+        assert!(!alone.contains("density"), "one object alone gains nothing by it: {alone}");
+    }
+}
