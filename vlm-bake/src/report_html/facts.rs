@@ -11,8 +11,10 @@ use super::tagged::SurfaceTags;
 use crate::bvh::nearest::closest_point;
 use crate::camera::CameraRays;
 use crate::gbuffer::GBuffer;
+use crate::patches::Patches;
 use crate::scene::{Camera, Scene};
 use crate::shade::{SurfacePoint, TraceScene};
+use crate::surface::SurfacePoint as PatchPoint;
 
 /// A pixel's point is known in single precision; it counts as lit by its light only below this share of the clearance.
 const ROUNDING: f64 = 0.98;
@@ -142,11 +144,16 @@ impl Evidence<'_> {
 }
 
 /// The region of the first point of each light.
-pub fn regions_of_lights(verification: &Verification, lights: usize) -> Vec<Option<u32>> {
+pub fn regions_of_lights(
+    patches: &Patches,
+    points: &[PatchPoint],
+    light_of_point: &[Option<u32>],
+    lights: usize,
+) -> Vec<Option<u32>> {
     let mut regions = vec![None; lights];
-    for (point, light) in verification.points.iter().zip(&verification.light_of_point) {
+    for (point, light) in points.iter().zip(light_of_point) {
         if let Some(light) = light {
-            let region = verification.patches.triangle_region[point.triangle as usize];
+            let region = patches.triangle_region[point.triangle as usize];
             regions[*light as usize].get_or_insert(region);
         }
     }

@@ -39,6 +39,7 @@ use page::{CloseUp, Gallery, Page};
 use pictures::Subject;
 use places::WorstPlace;
 use stand_in::verify_asset;
+use tables::Checked;
 use tagged::SurfaceTags;
 
 /// Size of the pictures, pixels. Larger ones show smaller lights and take more space.
@@ -78,11 +79,12 @@ pub fn report_html(subjects: &Subjects) -> Result<String, ImageError> {
     let lights = WorldLights::new(scene, asset);
     let mut pokes_out = vec![false; asset.triangles.len()];
     let open = verification.findings.iter().filter(|f| !f.tagged);
-    let open_depth_m = open.clone().map(|f| f.depth_m).fold(0.0, f64::max);
+    let depth_m = open.clone().map(|f| f.depth_m).fold(0.0, f64::max);
     for finding in open.clone().filter(|f| f.kind == stand_in::FindingKind::PokesOut) {
         pokes_out[finding.light as usize] = true;
     }
     let open = open.count();
+    let checked = Checked { open, depth_m, self_light: verification.self_light };
     let evidence = Evidence {
         scene,
         trace: TraceScene::new(scene),
@@ -91,7 +93,12 @@ pub fn report_html(subjects: &Subjects) -> Result<String, ImageError> {
         verification: &verification,
         correspondence: Correspondence::new(scene, &verification, &lights),
         tags: SurfaceTags::new(scene, asset),
-        region_of_light: facts::regions_of_lights(&verification, asset.triangles.len()),
+        region_of_light: facts::regions_of_lights(
+            &verification.patches,
+            &verification.points,
+            &verification.light_of_point,
+            asset.triangles.len(),
+        ),
         pokes_out,
     };
     let error_end_m = pictures::error_end(&evidence);
@@ -115,7 +122,7 @@ pub fn report_html(subjects: &Subjects) -> Result<String, ImageError> {
     let page = Page {
         title: subjects.title,
         summary: &summary,
-        reached: tables::asked_and_reached(report, (open, open_depth_m), &objects),
+        reached: tables::asked_and_reached(report, &checked, &objects),
         galleries: &galleries?,
         size: PICTURE,
         close_ups: &close_ups?,

@@ -79,7 +79,7 @@ impl Page<'_> {
                     main {
                         (section("reached", "Asked against reached", "", &self.reached))
                         (section("pictures", "Pictures", "", &self.pictures()))
-                        (section("places", "Worst places", "", &self.places()))
+                        (section("places", "Worst places", PLACES, &self.places()))
                         (section("objects", "Albedo and flux by object", OBJECTS, &self.objects))
                         (section("tags", "Tags", TAGS, &self.tags))
                         (section("size", "Size", "", &self.sizes))
@@ -161,6 +161,9 @@ impl Page<'_> {
         html! { ul { @for note in self.notes { li { (note) } } } }
     }
 }
+
+const PLACES: &str = "The camera stands in front of the place (circle) and looks straight at it. Outlined in yellow is the light in \
+    question, though it lies behind the surface; red is surface that its light reaches, blue is kept dark by a tag, hatched has no light.";
 
 const OBJECTS: &str = "An object's lights should have the mean albedo of its surface, and return as much light as it under uniform \
     light: flux near 100 %. The rule allows 2 %. In each pair the left colour is the surface's, the right one the lights'.";

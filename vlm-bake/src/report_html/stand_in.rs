@@ -3,7 +3,9 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use vlm_format::VlmAsset;
+use vlm_shaders::cpu::form_factor::{LightGeometry, form_factor};
 
+use super::facts::regions_of_lights;
 use super::lights::WorldLights;
 use super::tagged::SurfaceTags;
 use crate::bvh::Bvh;
@@ -15,6 +17,9 @@ use crate::surface::{Standing, SurfacePoint, spread_points, stand_ins};
 
 /// The least number of surface points.
 const LEAST_POINTS: usize = 200_000;
+
+/// Points at which light is summed.
+const SELF_LIGHT_POINTS: usize = 1000;
 
 /// A face stands for surface at most this share of the scene's extent away.
 const REACH_SHARE: f64 = 0.02;
@@ -29,8 +34,20 @@ pub struct Verification {
     pub findings: Vec<Finding>,
     /// Required clearance, metres.
     pub required_m: f64,
+    /// The light that surface receives from its own region.
+    pub self_light: SelfLight,
     /// The visible surface; [`SurfacePoint::triangle`] indexes its triangles.
     pub patches: Patches,
+}
+
+/// The irradiance that surface receives from lights of its own region where every light has unit radiosity, over the scene's mean;
+/// tags are honoured.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SelfLight {
+    /// What all but a thousandth of the points stay below.
+    pub p999: f64,
+    /// Greatest.
+    pub max: f64,
 }
 
 /// What is wrong with a light.
@@ -86,7 +103,40 @@ pub fn verify_asset(scene: &Scene, asset: &VlmAsset) -> Verification {
         })
     };
     let findings = (0..asset.triangles.len()).into_par_iter().filter_map(judge).collect();
-    Verification { points, light_of_point, findings, required_m, patches }
+    let self_light = self_light(&lights, asset, &patches, &points, &light_of_point, &tags);
+    Verification { points, light_of_point, findings, required_m, self_light, patches }
+}
+
+fn self_light(
+    lights: &WorldLights,
+    asset: &VlmAsset,
+    patches: &Patches,
+    points: &[SurfacePoint],
+    light_of_point: &[Option<u32>],
+    tags: &SurfaceTags,
+) -> SelfLight {
+    let geometry: Vec<LightGeometry> = lights.corners.iter().map(|c| LightGeometry::new(*c)).collect();
+    let regions = regions_of_lights(patches, points, light_of_point, geometry.len());
+    let every = points.len().div_ceil(SELF_LIGHT_POINTS).max(1);
+    let received: Vec<[f64; 2]> = points
+        .par_iter()
+        .step_by(every)
+        .map(|p| {
+            let region = Some(patches.triangle_region[p.triangle as usize]);
+            let tag = tags.of(patches.triangle_source[p.triangle as usize]);
+            let (x, n) = (p.position.as_vec3(), p.normal.as_vec3());
+            geometry.iter().enumerate().fold([0.0, 0.0], |[own, all], (l, light)| {
+                let ignored = tag != 0 && asset.tags.get(l) == Some(&tag);
+                let f = if ignored { 0.0 } else { f64::from(form_factor(light, x, n)) };
+                [own + if regions[l] == region { f } else { 0.0 }, all + f]
+            })
+        })
+        .collect();
+    let mean = received.iter().map(|r| r[1]).sum::<f64>() / received.len().max(1) as f64;
+    let mut own: Vec<f64> = received.iter().map(|r| r[0] / mean.max(f64::MIN_POSITIVE)).collect();
+    own.sort_unstable_by(f64::total_cmp);
+    let at = |i: usize| own.get(i).copied().unwrap_or(0.0);
+    SelfLight { p999: at(own.len() * 999 / 1000), max: at(own.len().saturating_sub(1)) }
 }
 
 #[expect(clippy::too_many_arguments, reason = "a stand-in")]

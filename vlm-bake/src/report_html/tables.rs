@@ -8,12 +8,16 @@ use vlm_format::VlmAsset;
 use super::colour::{css, encode, of_tag};
 use super::facts::Evidence;
 use super::objects::{ALLOWED, ObjectFigures, percent};
+use super::stand_in::SelfLight;
 use super::text::{area, bytes, count, length};
 use crate::report::Report;
 use crate::tag::{TagReason, TagReport};
 
 /// Rows of a table that are shown; the rest is summed up. More make a longer page.
 const MOST_ROWS: usize = 40;
+
+/// The share of the mean irradiance that surface may receive from its own region.
+const MOST_SELF_LIGHT: f64 = 1e-4;
 
 /// A row of the first table.
 #[derive(Clone, Default)]
@@ -26,9 +30,19 @@ struct Reached {
     note: String,
 }
 
-/// Asked against reached. `open` holds the number of lights that fail untagged, and how far the worst of them would have to move.
-pub fn asked_and_reached(report: &Report, open: (usize, f64), objects: &[ObjectFigures]) -> Markup {
-    let rows = [&bake_rows(report)[..], &check_rows(report, open, objects)[..]].concat();
+/// What the check of the lights found.
+pub struct Checked {
+    /// Lights that fail and that no tag keeps away.
+    pub open: usize,
+    /// How far the worst of them would have to move, metres.
+    pub depth_m: f64,
+    /// The light that surface receives from its own region.
+    pub self_light: SelfLight,
+}
+
+/// Asked against reached.
+pub fn asked_and_reached(report: &Report, checked: &Checked, objects: &[ObjectFigures]) -> Markup {
+    let rows = [&bake_rows(report)[..], &check_rows(report, checked, objects)[..]].concat();
     html! {
         div.scroll { table.reached {
             thead { tr { th {} th.n { "asked" } th.n { "reached" } th {} } }
@@ -80,12 +94,12 @@ fn bake_rows(report: &Report) -> [Reached; 5] {
 }
 
 /// Rows about what the check found.
-fn check_rows(report: &Report, open: (usize, f64), objects: &[ObjectFigures]) -> [Reached; 5] {
+fn check_rows(report: &Report, checked: &Checked, objects: &[ObjectFigures]) -> [Reached; 6] {
     let share = |part: f64, whole: f64| part.max(0.0) / whole.max(f64::MIN_POSITIVE);
     let tagged = share(report.area.tagged_m2, report.area.lights_m2);
     let uncovered = share(report.area.uncovered_m2, report.area.visible_m2);
     let missed = objects.iter().filter(|o| !o.why_missed().is_empty()).count();
-    let (failing, depth_m) = open;
+    let Checked { open: failing, depth_m, self_light } = *checked;
     [
         Reached {
             what: "Lights that shine where they must not",
@@ -104,6 +118,16 @@ fn check_rows(report: &Report, open: (usize, f64), objects: &[ObjectFigures]) ->
             ),
             good: failing == 0,
             note: "least depth behind the surface, where no tag helps".to_owned(),
+        },
+        Reached {
+            what: "Light of surface on itself",
+            asked: format!("≤ {}", percent(MOST_SELF_LIGHT)),
+            reached: percent(self_light.p999),
+            good: self_light.p999 <= MOST_SELF_LIGHT,
+            note: format!(
+                "of the mean irradiance, all lights alike: what 99.9 % of the surface stays below; at most {}",
+                percent(self_light.max)
+            ),
         },
         Reached {
             what: "Tagged lights",

@@ -105,6 +105,12 @@ impl Scene {
         let view = look(centre, backward);
         let (right, up) = (view.x_axis.truncate(), view.y_axis.truncate());
         let inside = |p: &&Vec3| p.cmpge(minimum).all() && p.cmple(maximum).all();
+        let middle = |axis: DVec3| {
+            let along = self.positions.iter().filter(inside).map(|p| (p.as_dvec3() - centre).dot(axis));
+            let [low, high] = along.fold([0.0_f64, 0.0_f64], |[low, high], x| [low.min(x), high.max(x)]);
+            0.5 * (low + high) * axis
+        };
+        let centre = centre + middle(right) + middle(up);
         let needed = |p: &Vec3| {
             let q = p.as_dvec3() - centre;
             let across = (q.dot(right).abs() / aspect).max(q.dot(up).abs());
