@@ -7,3 +7,4 @@ mod bad_input;
 mod baking;
 mod authored;
 mod commands;
+mod report_html;
