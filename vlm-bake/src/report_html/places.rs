@@ -145,7 +145,7 @@ fn uncovered(evidence: &Evidence) -> Vec<WorstPlace> {
         let away = |p: &&crate::surface::SurfacePoint| p.position.distance_squared(mean);
         let nearest = points().min_by(|a, b| away(a).total_cmp(&away(b)))?;
         let (object, material) = names_of(evidence, nearest.triangle);
-        (amount >= LEAST_UNCOVERED * visible).then(|| WorstPlace {
+        (amount >= LEAST_UNCOVERED * visible).then_some(WorstPlace {
             trouble: Trouble::Uncovered,
             tagged: false,
             object,

@@ -51,7 +51,7 @@ pub fn summary(
 ) -> Summary {
     let changes = changes(report, open, objects, places, remedies);
     let (level, headline) = match (open, changes.len()) {
-        (0, 0) => (Level::Good, "Fine: nothing to change".to_owned()),
+        (0, 0) => (Level::Good, "Fine: nothing worth changing".to_owned()),
         (0, _) => (
             Level::Look,
             "Usable: no light shines where it must not, but light is lost or displaced".to_owned(),
@@ -125,13 +125,12 @@ fn uncovered(report: &Report, objects: &[ObjectFigures], remedies: &Remedies) ->
 /// The largest object that misses the rule of 2 %, if such objects matter in the scene.
 fn missing(objects: &[ObjectFigures]) -> Option<String> {
     let missed: Vec<&ObjectFigures> = objects.iter().filter(|o| !o.why_missed().is_empty()).collect();
-    let reflecting = |o: &&ObjectFigures| o.visible_m2 * f64::from(o.albedo.element_sum());
     let worst = missed.iter().copied().max_by(|a, b| {
-        let lost = |o: &&ObjectFigures| reflecting(o) * (o.flux_ratio - 1.0).abs().max(o.albedo_error());
+        let lost = |o: &ObjectFigures| reflecting(o) * (o.flux_ratio - 1.0).abs().max(o.albedo_error());
         lost(a).total_cmp(&lost(b))
     })?;
-    let (lost, all): (f64, f64) =
-        (missed.iter().map(|o| reflecting(o)).sum(), objects.iter().map(|o| reflecting(&o)).sum());
+    let lost: f64 = missed.iter().copied().map(reflecting).sum();
+    let all: f64 = objects.iter().map(reflecting).sum();
     (lost > 0.01 * all).then(|| {
         format!(
             "{} of {} not keep albedo and flux within 2 %; it matters most at {} (flux {}, albedo off by {}): {}.",
@@ -143,6 +142,11 @@ fn missing(objects: &[ObjectFigures]) -> Option<String> {
             worst.why_missed()
         )
     })
+}
+
+/// Reflecting area of an object: area times albedo.
+fn reflecting(object: &ObjectFigures) -> f64 {
+    object.visible_m2 * f64::from(object.albedo.element_sum())
 }
 
 fn tagged(report: &Report) -> Option<String> {

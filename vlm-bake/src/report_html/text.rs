@@ -3,7 +3,7 @@
 /// A length in the unit that suits it.
 pub fn length(metres: f64) -> String {
     let (value, unit) = match metres.abs() {
-        m if m == 0.0 => return "0 mm".to_owned(),
+        0.0 => return "0 mm".to_owned(),
         m if m < 1e-4 => (metres * 1e6, "µm"),
         m if m < 1.0 => (metres * 1e3, "mm"),
         m if m < 1e4 => (metres, "m"),
@@ -21,7 +21,7 @@ pub fn area(square_metres: f64) -> String {
 pub fn three_digits(value: f64) -> String {
     let magnitude = value.abs();
     match magnitude {
-        m if m == 0.0 => "0".to_owned(),
+        0.0 => "0".to_owned(),
         m if m < 1e-3 => format!("{value:.1e}"),
         m if m < 0.0995 => format!("{value:.4}"),
         m if m < 0.9995 => format!("{value:.3}"),

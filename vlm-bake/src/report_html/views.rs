@@ -66,6 +66,42 @@ pub fn project(camera: &Camera, aspect: f64, point: DVec3) -> Option<[f64; 2]> {
 mod tests {
     use super::*;
 
+    /// A box from the origin to (3, 2, 1), with cameras at these places.
+    fn scene(eyes: &[DVec3]) -> Scene {
+        let corner = |i: u32| glam::Vec3::new(3.0 * (i & 1) as f32, (i & 2) as f32, (i >> 2) as f32);
+        let camera = |eye: &DVec3| Camera {
+            name: "own".to_owned(),
+            world_from_view: look(*eye, DVec3::Z),
+            projection: Projection::Perspective(1.0),
+        };
+        Scene {
+            positions: (0..8).map(corner).collect(),
+            triangles: vec![[0, 1, 3], [4, 5, 7], [2, 6, 3]],
+            cameras: eyes.iter().map(camera).collect(),
+            ..Scene::default()
+        }
+    }
+
+    #[test]
+    fn an_overview_comes_where_all_cameras_are_inside() {
+        let (inside, outside) = (DVec3::new(1.0, 1.0, 0.5), DVec3::new(1.0, 1.0, 5.0));
+        let names =
+            |eyes: &[DVec3]| cameras(&scene(eyes), 1.5).into_iter().map(|c| c.name).collect::<Vec<_>>();
+        assert_eq!(names(&[inside]), ["own", "overview"]);
+        assert_eq!(names(&[inside, outside]), ["own", "own"]);
+    }
+
+    #[test]
+    fn the_overview_frames_every_vertex_tightly() {
+        let scene = scene(&[]);
+        for aspect in [0.5, 1.0, 3.0] {
+            let camera = scene.overview(aspect);
+            let seen = scene.positions.iter().map(|p| project(&camera, aspect, p.as_dvec3()).unwrap());
+            let away = seen.map(|[x, y]| (x - 0.5).abs().max((y - 0.5).abs())).fold(0.0, f64::max);
+            assert!((0.4..0.5).contains(&away), "{away} of the picture at {aspect}");
+        }
+    }
+
     #[test]
     fn a_close_ups_place_is_in_its_middle() {
         let camera = Camera {
