@@ -34,9 +34,9 @@ const STEPS: f64 = 48.0;
 /// Evenly spaced to the eye, and readable by the colour-blind: dark blue is 0, yellow is 1.
 pub const RAMP: Gradient = VIRIDIS;
 
-/// The ramp's colour at `t`, 0 to 1.
+/// The ramp's colour at `t`, 0 to 1; NaN counts as 0.
 pub fn ramp(t: f64) -> [u8; 3] {
-    let step = (t.clamp(0.0, 1.0) * STEPS).round() / STEPS;
+    let step = (t.max(0.0).min(1.0) * STEPS).round() / STEPS;
     RAMP.eval_continuous(step).as_array()
 }
 
@@ -100,5 +100,6 @@ mod tests {
         assert!((0..10).all(|i| brightness(f64::from(i) / 10.0) < brightness(f64::from(i + 1) / 10.0)));
         assert_eq!(ramp(-1.0), ramp(0.0));
         assert_eq!(ramp(f64::INFINITY), ramp(1.0));
+        assert_eq!(ramp(f64::NAN), ramp(0.0));
     }
 }

@@ -45,9 +45,9 @@ mod tests {
         let uri = data_uri(&flat).unwrap();
         let bytes = STANDARD.decode(uri.strip_prefix("data:image/png;base64,").unwrap()).unwrap();
         assert_eq!(image::load_from_memory(&bytes).unwrap().into_rgb8(), flat);
-        let noisy = RgbImage::from_fn(64, 64, |x, y| {
-            Rgb([0, 1, 2].map(|c| (scramble(3 * (64 * y + x) + c) * 255.0) as u8))
-        });
+        // Slow change with a little grain, as a texture has.
+        let grainy = |x: u32, y: u32, c: u32| (x + y + 30 * c) as f32 + 12.0 * scramble(3 * (64 * y + x) + c);
+        let noisy = RgbImage::from_fn(64, 64, |x, y| Rgb([0, 1, 2].map(|c| grainy(x, y, c) as u8)));
         assert!(data_uri(&noisy).unwrap().starts_with("data:image/jpeg;base64,"));
     }
 }

@@ -37,8 +37,8 @@ pub struct Evidence<'a> {
     pub tags: SurfaceTags<'a>,
     /// The region for which each light stands: that of the first of its points; `None` for a light without points.
     pub region_of_light: Vec<Option<u32>>,
-    /// Per light: it comes out somewhere and no tag keeps it away.
-    pub pokes_out: Vec<bool>,
+    /// Per light: whether it comes out somewhere, and then whether a tag keeps it away.
+    pub pokes_out: Vec<Option<bool>>,
 }
 
 /// A visible point and what stands for it.

@@ -38,7 +38,7 @@ use objects::{Grouping, ObjectFigures};
 use page::{CloseUp, Gallery, Page};
 use pictures::Subject;
 use places::WorstPlace;
-use stand_in::verify_asset;
+use stand_in::{FindingKind, verify_asset};
 use tables::Checked;
 use tagged::SurfaceTags;
 
@@ -77,12 +77,12 @@ pub fn report_html(subjects: &Subjects) -> Result<String, ImageError> {
     let (asset, report) = (&bake.asset, &bake.report);
     let verification = verify_asset(scene, asset);
     let lights = WorldLights::new(scene, asset);
-    let mut pokes_out = vec![false; asset.triangles.len()];
+    let mut pokes_out = vec![None; asset.triangles.len()];
+    for finding in verification.findings.iter().filter(|f| f.kind == FindingKind::PokesOut) {
+        pokes_out[finding.light as usize] = Some(finding.tagged);
+    }
     let open = verification.findings.iter().filter(|f| !f.tagged);
     let depth_m = open.clone().map(|f| f.depth_m).fold(0.0, f64::max);
-    for finding in open.clone().filter(|f| f.kind == stand_in::FindingKind::PokesOut) {
-        pokes_out[finding.light as usize] = true;
-    }
     let open = open.count();
     let checked = Checked { open, depth_m, self_light: verification.self_light };
     let evidence = Evidence {

@@ -116,7 +116,11 @@ impl Grouping {
     fn name(self, evidence: &Evidence, group: usize) -> String {
         let scene = evidence.scene;
         match self {
-            Self::Object => scene.objects[group].path.clone(),
+            Self::Object => {
+                let (path, node) = (&scene.objects[group].path, scene.objects[group].node);
+                let is_alone = scene.objects.iter().filter(|o| o.path == *path).count() == 1;
+                if is_alone { path.clone() } else { format!("{path} (node {node})") }
+            }
             Self::Part => {
                 let primitive = &scene.primitives[group];
                 let path = &scene.objects[primitive.object as usize].path;

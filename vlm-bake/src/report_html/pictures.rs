@@ -118,7 +118,7 @@ fn of_violation(evidence: &Evidence, fact: &Fact) -> Option<[u8; 3]> {
     if fact.fails(evidence.verification.required_m) {
         return Some(if fact.is_kept_dark() { KEPT_DARK } else { VIOLATION });
     }
-    evidence.pokes_out[light as usize].then_some(POKING)
+    evidence.pokes_out[light as usize].map(|tagged| if tagged { KEPT_DARK } else { POKING })
 }
 
 /// Diagonal stripes.

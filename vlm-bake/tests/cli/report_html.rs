@@ -199,6 +199,16 @@ fn two_sided_sheets_are_listed_with_their_reason_and_cost() {
 }
 
 #[test]
+fn a_scene_of_authored_lights_alone_has_a_page() {
+    let mut document = Document::room();
+    document.json["nodes"][0]["extras"] = json!({ "vlm": { "exclude": true } });
+    document.push("VLM_panel", &[BANNER], Some(2));
+    let page = page_of(&document, &[]);
+    assert!(section(&page, "objects").contains("VLM_panel"));
+    assert!(!page.contains("NaN"));
+}
+
+#[test]
 fn a_missing_folder_is_named_before_the_bake() {
     let folders = Folders::new();
     let (output, page) = (folders.output("out.glb"), folders.output("none/page.html"));
