@@ -36,7 +36,8 @@ pub const RAMP: Gradient = VIRIDIS;
 
 /// The ramp's colour at `t`, 0 to 1; NaN counts as 0.
 pub fn ramp(t: f64) -> [u8; 3] {
-    let step = (t.max(0.0).min(1.0) * STEPS).round() / STEPS;
+    let t = if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) };
+    let step = (t * STEPS).round() / STEPS;
     RAMP.eval_continuous(step).as_array()
 }
 

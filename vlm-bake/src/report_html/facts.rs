@@ -6,7 +6,7 @@ use vlm_format::VlmAsset;
 
 use super::correspondence::{Correspondence, Place};
 use super::lights::WorldLights;
-use super::stand_in::Verification;
+use super::stand_in::{FindingKind, Verification};
 use super::tagged::SurfaceTags;
 use crate::bvh::nearest::closest_point;
 use crate::camera::CameraRays;
@@ -89,7 +89,32 @@ pub struct View {
     pub facts: Vec<Option<Fact>>,
 }
 
-impl Evidence<'_> {
+impl<'a> Evidence<'a> {
+    /// Prepares the queries.
+    pub fn new(
+        scene: &'a Scene,
+        asset: &'a VlmAsset,
+        lights: &'a WorldLights,
+        verification: &'a Verification,
+    ) -> Self {
+        let Verification { patches, points, light_of_point, findings, .. } = verification;
+        let mut pokes_out = vec![None; asset.triangles.len()];
+        for finding in findings.iter().filter(|f| f.kind == FindingKind::PokesOut) {
+            pokes_out[finding.light as usize] = Some(finding.tagged);
+        }
+        Self {
+            scene,
+            trace: TraceScene::new(scene),
+            asset,
+            lights,
+            verification,
+            correspondence: Correspondence::new(scene, verification, lights),
+            tags: SurfaceTags::new(scene, asset),
+            region_of_light: regions_of_lights(patches, points, light_of_point, asset.triangles.len()),
+            pokes_out,
+        }
+    }
+
     /// The facts of every pixel of a camera.
     pub fn view(&self, camera: &Camera, width: u32, height: u32) -> View {
         let rays = CameraRays::new(camera, width, height);

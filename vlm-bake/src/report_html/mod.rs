@@ -1,6 +1,6 @@
 //! The report of a bake as a page for artists: one HTML file with everything in it.
 //!
-//! Facts first (`stand_in -> lights, tagged -> correspondence -> facts`), then what is made of them: pictures, tables, places, a
+//! Facts first (`stand_in, lights, tagged -> correspondence -> facts`), then what is made of them: pictures, tables, places, a
 //! verdict, the page. The same bake gives the same page, but for the seconds by stage.
 
 mod lights;
@@ -15,6 +15,7 @@ mod pictures;
 mod objects;
 mod tag_cost;
 mod text;
+mod checked;
 mod places;
 mod advice;
 mod summary;
@@ -29,18 +30,15 @@ use maud::{Markup, html};
 
 use crate::bake::Bake;
 use crate::scene::{Camera, Scene};
-use crate::shade::TraceScene;
 use advice::Remedies;
-use correspondence::Correspondence;
+use checked::Checked;
 use facts::Evidence;
 use lights::WorldLights;
 use objects::{Grouping, ObjectFigures};
 use page::{CloseUp, Gallery, Page};
 use pictures::Subject;
 use places::WorstPlace;
-use stand_in::{FindingKind, verify_asset};
-use tables::Checked;
-use tagged::SurfaceTags;
+use stand_in::verify_asset;
 
 /// Size of the pictures, pixels. Larger ones show smaller lights and take more space.
 const PICTURE: [u32; 2] = [480, 360];
@@ -54,6 +52,9 @@ const CLOSE_SPAN: [f64; 2] = [2.5, 40.0];
 
 /// Up to so many objects are shown by part, too.
 const FEW_OBJECTS: usize = 8;
+
+/// No bake makes more lights than this.
+const MOST_LIGHTS: u32 = 1_000_000;
 
 /// What the page is about.
 #[derive(Clone, Copy)]
@@ -77,41 +78,19 @@ pub fn report_html(subjects: &Subjects) -> Result<String, ImageError> {
     let (asset, report) = (&bake.asset, &bake.report);
     let verification = verify_asset(scene, asset);
     let lights = WorldLights::new(scene, asset);
-    let mut pokes_out = vec![None; asset.triangles.len()];
-    for finding in verification.findings.iter().filter(|f| f.kind == FindingKind::PokesOut) {
-        pokes_out[finding.light as usize] = Some(finding.tagged);
-    }
-    let open = verification.findings.iter().filter(|f| !f.tagged);
-    let depth_m = open.clone().map(|f| f.depth_m).fold(0.0, f64::max);
-    let open = open.count();
-    let checked = Checked { open, depth_m, self_light: verification.self_light };
-    let evidence = Evidence {
-        scene,
-        trace: TraceScene::new(scene),
-        asset,
-        lights: &lights,
-        verification: &verification,
-        correspondence: Correspondence::new(scene, &verification, &lights),
-        tags: SurfaceTags::new(scene, asset),
-        region_of_light: facts::regions_of_lights(
-            &verification.patches,
-            &verification.points,
-            &verification.light_of_point,
-            asset.triangles.len(),
-        ),
-        pokes_out,
-    };
+    let checked = Checked::of(&verification);
+    let evidence = Evidence::new(scene, asset, &lights, &verification);
     let error_end_m = pictures::error_end(&evidence);
     let surfaces = scene.triangle_surfaces();
     let objects = objects::figures(&evidence, &surfaces, Grouping::Object);
     let parts = objects::figures(&evidence, &surfaces, Grouping::Part);
     let remedies = Remedies {
         required_m: verification.required_m,
-        more_lights: report.asked_lights.saturating_mul(2),
+        more_lights: report.asked_lights.saturating_mul(2).min(MOST_LIGHTS),
         can_steer: objects.len() > 1,
     };
     let places = places::worst_places(&evidence, error_end_m);
-    let summary = summary::summary(report, open, &objects, &places, &remedies);
+    let summary = summary::summary(report, &checked, &objects, &places, &remedies);
     let galleries: Result<Vec<Gallery>, ImageError> =
         views::cameras(scene, f64::from(PICTURE[0]) / f64::from(PICTURE[1]))
             .iter()
@@ -128,7 +107,7 @@ pub fn report_html(subjects: &Subjects) -> Result<String, ImageError> {
         close_ups: &close_ups?,
         remedies: &remedies,
         error_end_m,
-        visible_m2: report.area.visible_m2,
+        visible_m2: checked.visible_m2,
         objects: object_tables(&objects, &parts),
         tags: tables::tag_table(&evidence, &report.tags, &tag_cost::tag_costs(&evidence)),
         sizes: tables::size_table(asset, subjects.file_bytes),

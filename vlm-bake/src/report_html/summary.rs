@@ -1,6 +1,7 @@
 //! The verdict in plain words, and what to change first.
 
 use super::advice::Remedies;
+use super::checked::Checked;
 use super::objects::{ObjectFigures, percent};
 use super::places::{Trouble, WorstPlace};
 use super::text::{area, length, node, plural};
@@ -41,16 +42,16 @@ pub struct Summary {
     pub changes: Vec<String>,
 }
 
-/// Sums up a bake. `open` is the number of lights that fail and that no tag keeps away.
+/// Sums up a bake.
 pub fn summary(
     report: &Report,
-    open: usize,
+    checked: &Checked,
     objects: &[ObjectFigures],
     places: &[WorstPlace],
     remedies: &Remedies,
 ) -> Summary {
-    let changes = changes(report, open, objects, places, remedies);
-    let (level, headline) = match (open, changes.len()) {
+    let changes = changes(report, checked, objects, places, remedies);
+    let (level, headline) = match (checked.open, changes.len()) {
         (0, 0) => (Level::Good, "Fine: nothing worth changing".to_owned()),
         (0, _) => (
             Level::Look,
@@ -60,40 +61,39 @@ pub fn summary(
             Level::Bad,
             format!(
                 "Not fine: {}",
-                plural(open, "light shines where it must not", "lights shine where they must not")
+                plural(checked.open, "light shines where it must not", "lights shine where they must not")
             ),
         ),
     };
     let tagged = report.area.tagged_m2.max(0.0) / report.area.lights_m2.max(f64::MIN_POSITIVE);
-    let uncovered = report.area.uncovered_m2 / report.area.visible_m2.max(f64::MIN_POSITIVE);
-    let hidden = match open {
+    let hidden = match checked.open {
         0 => "Every one of them is hidden behind the surface that it stands for, or kept off it by a tag",
         _ => "The others are hidden behind the surface that they stand for, or kept off it by a tag",
     };
     let text = format!(
         "{} stand for {} of surface. {hidden} ({} of the lights' area is tagged); {} of the surface has no light.",
         plural(report.lights, "light", "lights"),
-        area(report.area.visible_m2),
+        area(checked.visible_m2),
         percent(tagged),
-        percent(uncovered),
+        percent(checked.uncovered()),
     );
     Summary { level, headline, text, changes }
 }
 
 fn changes(
     report: &Report,
-    open: usize,
+    checked: &Checked,
     objects: &[ObjectFigures],
     places: &[WorstPlace],
     remedies: &Remedies,
 ) -> Vec<String> {
     let found = [
-        open_lights(open, places, remedies),
-        uncovered(report, objects, remedies),
+        open_lights(checked.open, places, remedies),
+        uncovered(checked, objects, remedies),
         missing(objects),
         tagged(report),
         budget(report),
-        offset(report),
+        offset(report, checked),
     ];
     found.into_iter().flatten().take(MOST).collect()
 }
@@ -108,8 +108,8 @@ fn open_lights(open: usize, places: &[WorstPlace], remedies: &Remedies) -> Optio
     ))
 }
 
-fn uncovered(report: &Report, objects: &[ObjectFigures], remedies: &Remedies) -> Option<String> {
-    let share = report.area.uncovered_m2 / report.area.visible_m2.max(f64::MIN_POSITIVE);
+fn uncovered(checked: &Checked, objects: &[ObjectFigures], remedies: &Remedies) -> Option<String> {
+    let share = checked.uncovered();
     let most = objects.iter().max_by(|a, b| a.uncovered_m2.total_cmp(&b.uncovered_m2))?;
     (share > UNCOVERED).then(|| {
         format!(
@@ -171,8 +171,8 @@ fn budget(report: &Report) -> Option<String> {
     })
 }
 
-fn offset(report: &Report) -> Option<String> {
-    let allowed = OFFSET * (report.decimation.error_m + report.clearance.required_m);
+fn offset(report: &Report, checked: &Checked) -> Option<String> {
+    let allowed = OFFSET * (report.decimation.error_m + checked.required_m);
     (report.offset.mean_m > allowed).then(|| {
         format!(
             "Lights lie {} deep on average, where {} would do: sharp corners, hollows and folds push them down. More lights follow the \
@@ -187,32 +187,41 @@ fn offset(report: &Report) -> Option<String> {
 mod tests {
     use super::*;
     use crate::report::AreaReport;
+    use crate::report_html::stand_in::SelfLight;
 
     const REMEDIES: Remedies = Remedies { required_m: 1e-3, more_lights: 200, can_steer: true };
+
+    const CLEAN: Checked = Checked {
+        open: 0,
+        depth_m: 0.0,
+        required_m: 1e-3,
+        self_light: SelfLight { p999: 0.0, max: 0.0 },
+        visible_m2: 10.0,
+        uncovered_m2: 0.0,
+    };
 
     fn report() -> Report {
         Report {
             lights: 100,
             asked_lights: 100,
-            area: AreaReport { visible_m2: 10.0, lights_m2: 10.0, ..AreaReport::default() },
+            area: AreaReport { lights_m2: 10.0, ..AreaReport::default() },
             ..Report::default()
         }
     }
 
     #[test]
     fn a_clean_bake_has_nothing_to_change() {
-        let clean = summary(&report(), 0, &[], &[], &REMEDIES);
+        let clean = summary(&report(), &CLEAN, &[], &[], &REMEDIES);
         assert_eq!((clean.level, clean.changes.len()), (Level::Good, 0));
     }
 
     #[test]
     fn open_lights_are_bad_and_lost_light_is_worth_a_look() {
-        assert_eq!(summary(&report(), 1, &[], &[], &REMEDIES).level, Level::Bad);
-        let mut lossy = report();
-        lossy.area.uncovered_m2 = 1.0;
+        assert_eq!(summary(&report(), &Checked { open: 1, ..CLEAN }, &[], &[], &REMEDIES).level, Level::Bad);
+        let lossy = Checked { uncovered_m2: 1.0, ..CLEAN };
         let objects =
             [ObjectFigures { path: "Room/Chair".to_owned(), uncovered_m2: 1.0, ..ObjectFigures::default() }];
-        let lossy = summary(&lossy, 0, &objects, &[], &REMEDIES);
+        let lossy = summary(&report(), &lossy, &objects, &[], &REMEDIES);
         assert_eq!(lossy.level, Level::Look);
         assert!(
             lossy.changes[0].contains("10 %") && lossy.changes[0].contains("Chair"),
@@ -221,6 +230,6 @@ mod tests {
         );
         let mut deep = report();
         deep.offset.mean_m = 1.0;
-        assert!(summary(&deep, 0, &[], &[], &REMEDIES).changes[0].contains("deep"));
+        assert!(summary(&deep, &CLEAN, &[], &[], &REMEDIES).changes[0].contains("deep"));
     }
 }

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use maud::{Markup, html};
 use vlm_format::VlmAsset;
 
+use super::checked::Checked;
 use super::colour::{css, encode, of_tag};
 use super::facts::Evidence;
 use super::objects::{ALLOWED, ObjectFigures, percent};
-use super::stand_in::SelfLight;
 use super::text::{area, bytes, count, length};
 use crate::report::Report;
 use crate::tag::{TagReason, TagReport};
@@ -30,19 +30,10 @@ struct Reached {
     note: String,
 }
 
-/// What the check of the lights found.
-pub struct Checked {
-    /// Lights that fail and that no tag keeps away.
-    pub open: usize,
-    /// How far the worst of them would have to move, metres.
-    pub depth_m: f64,
-    /// The light that surface receives from its own region.
-    pub self_light: SelfLight,
-}
-
 /// Asked against reached.
 pub fn asked_and_reached(report: &Report, checked: &Checked, objects: &[ObjectFigures]) -> Markup {
-    let rows = [&bake_rows(report)[..], &check_rows(report, checked, objects)[..]].concat();
+    let rows =
+        [&bake_rows(report, checked.required_m)[..], &check_rows(report, checked, objects)[..]].concat();
     html! {
         div.scroll { table.reached {
             thead { tr { th {} th.n { "asked" } th.n { "reached" } th {} } }
@@ -58,8 +49,8 @@ pub fn asked_and_reached(report: &Report, checked: &Checked, objects: &[ObjectFi
 }
 
 /// Rows about what the bake made.
-fn bake_rows(report: &Report) -> [Reached; 5] {
-    let offset_limit = 1.5 * (report.decimation.error_m + report.clearance.required_m);
+fn bake_rows(report: &Report, required_m: f64) -> [Reached; 5] {
+    let offset_limit = 1.5 * (report.decimation.error_m + required_m);
     let (asked, reached) = (report.decimation.asked as u64, report.decimation.reached as u64);
     [
         Reached {
@@ -97,9 +88,9 @@ fn bake_rows(report: &Report) -> [Reached; 5] {
 fn check_rows(report: &Report, checked: &Checked, objects: &[ObjectFigures]) -> [Reached; 6] {
     let share = |part: f64, whole: f64| part.max(0.0) / whole.max(f64::MIN_POSITIVE);
     let tagged = share(report.area.tagged_m2, report.area.lights_m2);
-    let uncovered = share(report.area.uncovered_m2, report.area.visible_m2);
+    let uncovered = checked.uncovered();
     let missed = objects.iter().filter(|o| !o.why_missed().is_empty()).count();
-    let Checked { open: failing, depth_m, self_light } = *checked;
+    let Checked { open: failing, depth_m, required_m, self_light, .. } = *checked;
     [
         Reached {
             what: "Lights that shine where they must not",
@@ -110,12 +101,8 @@ fn check_rows(report: &Report, checked: &Checked, objects: &[ObjectFigures]) -> 
         },
         Reached {
             what: "Clearance",
-            asked: format!("≥ {}", length(report.clearance.required_m)),
-            reached: format!(
-                "{} {}",
-                if failing == 0 { "≥" } else { "" },
-                length(report.clearance.required_m - depth_m)
-            ),
+            asked: format!("≥ {}", length(required_m)),
+            reached: format!("{} {}", if failing == 0 { "≥" } else { "" }, length(required_m - depth_m)),
             good: failing == 0,
             note: "least depth behind the surface, where no tag helps".to_owned(),
         },
