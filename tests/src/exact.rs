@@ -62,7 +62,7 @@ impl ExactPixels {
     }
 }
 
-fn exact_sum(lit: &LitScene<'_>, receiver: &Receiver) -> DVec3 {
+fn exact_sum(lit: &LitScene, receiver: &Receiver) -> DVec3 {
     let (x, n) = (receiver.position, receiver.normal);
     let height = |corner: &Vec3| (*corner - x).as_dvec3().dot(receiver.geometric_normal.as_dvec3());
     let lights = lit.lights.geometry.iter().zip(&lit.lights.tags).zip(&lit.radiosity);

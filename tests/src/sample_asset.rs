@@ -4,9 +4,10 @@
 use base64::Engine;
 use glam::Vec3;
 use serde_json::json;
-use vlm_format::{GltfFile, Grid, Sample, Settings, Vlm, VlmAsset};
+use vlm_format::{GltfFile, Grid, Sample, Settings, TriangleTags, Vlm, VlmAsset};
 
-/// Two lights for each of the first two nodes with a mesh, with samples, tags, emission and a grid.
+/// Two lights for each of the first two nodes with a mesh, with samples, tags, emission and a grid. The first primitive that
+/// draws triangles is tagged as a whole, the second by triangle, the first bearer and the last node as nodes.
 pub fn quads(file: &GltfFile) -> VlmAsset {
     let mut asset = VlmAsset {
         generator: String::from("sample 1.0"),
@@ -24,8 +25,7 @@ pub fn quads(file: &GltfFile) -> VlmAsset {
     for node in bearers {
         push_quad(&mut asset, node.index() as u32);
     }
-    let tagged = file.document().meshes().next().filter(|mesh| mesh.primitives().len() > 0);
-    asset.primitive_tags = tagged.map(|mesh| (mesh.index() as u32, 0, 7)).into_iter().collect();
+    tag_surface(&mut asset, file);
     let entries: Vec<u32> = (0..asset.triangles.len() as u32).collect();
     asset.grid = Some(Grid {
         origin: Vec3::new(-0.1, 0.2, 1e-7),
@@ -36,6 +36,28 @@ pub fn quads(file: &GltfFile) -> VlmAsset {
         entries,
     });
     asset
+}
+
+fn tag_surface(asset: &mut VlmAsset, file: &GltfFile) {
+    let primitives = file.document().meshes().flat_map(|mesh| {
+        let primitives = mesh.primitives().map(|p| p.index() as u32).collect::<Vec<_>>();
+        primitives.into_iter().map(move |primitive| (mesh.index() as u32, primitive))
+    });
+    let mut drawn = primitives.filter_map(|(mesh, primitive)| {
+        let count = file.triangle_count(mesh, primitive).filter(|&count| count > 0)?;
+        Some((mesh, primitive, count as u32))
+    });
+    asset.primitive_tags =
+        drawn.next().map(|(mesh, primitive, _)| (mesh, primitive, 7)).into_iter().collect();
+    let by_triangle = drawn.next().map(|(mesh, primitive, count)| {
+        let tags = (0..count).map(|triangle| (triangle + 1) % 3).collect();
+        TriangleTags { mesh, primitive, tags }
+    });
+    asset.triangle_tags = by_triangle.into_iter().collect();
+    let last = file.document().nodes().map(|node| node.index() as u32).last();
+    asset.node_tags =
+        asset.vlms.first().map(|vlm| vlm.node).into_iter().chain(last).map(|n| (n, 90 + n)).collect();
+    asset.node_tags.dedup();
 }
 
 fn push_quad(asset: &mut VlmAsset, node: u32) {

@@ -103,12 +103,14 @@ pub fn add(scene: &mut Scene, mesh: &Mesh, material: Material) {
     scene.vertex_colors.extend(vec![Vec3::ONE; corners]);
     scene.triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + first)));
     scene.triangle_primitive.extend(vec![number; mesh.triangles.len()]);
+    scene.triangle_in_primitive.extend(0..mesh.triangles.len() as u32);
     scene.primitives.push(ScenePrimitive {
         object: number,
         mesh: number,
         primitive: 0,
         material: number,
         triangles,
+        drawn_triangles: mesh.triangles.len() as u32,
     });
     scene.materials.push(material);
     scene.objects.push(Object {

@@ -154,7 +154,7 @@ fn reaches(hemisphere: &ActiveHemisphere, low: Vec3, high: Vec3) -> bool {
 
 /// Sums the form factors of the listed lights.
 #[must_use]
-pub fn gather(lit: &LitScene<'_>, list: impl Iterator<Item = u32>, receiver: &Receiver) -> Gathered {
+pub fn gather(lit: &LitScene, list: impl Iterator<Item = u32>, receiver: &Receiver) -> Gathered {
     let mut gathered = Gathered::default();
     for light in list {
         let light = light as usize;

@@ -46,9 +46,11 @@ fn written_files_have_no_errors() {
     let (true, Some(corpus)) = (has_validator(), assets::find("corpus")) else { return };
     let folder = tempfile::tempdir().unwrap();
     let mut written = Vec::new();
+    let mut by_triangle = 0;
     for (i, name) in FILES.iter().enumerate() {
         let file = GltfFile::open(&corpus.join(name)).unwrap();
         let asset = sample_asset::quads(&file);
+        by_triangle += asset.triangle_tags.len();
         for (container, file_name) in [
             (Container::Glb, "out.glb"),
             (Container::Gltf { embedded: false }, "out.gltf"),
@@ -65,6 +67,7 @@ fn written_files_have_no_errors() {
     for report in validate(&inputs).iter().chain(&validate(&written)) {
         assert_eq!(errors(report), Vec::<&Value>::new(), "{}", report["file"]);
     }
+    assert!(by_triangle > 0, "no file has tags by triangle");
     println!("{} files written, 0 errors", written.len());
 }
 

@@ -113,10 +113,11 @@ fn reopen(outputs: &[OutputFile]) -> (tempfile::TempDir, GltfFile) {
 #[cfg_attr(not(has_corpus), ignore = "the corpus is neither in VLM_ASSETS nor in ../shared/assets")]
 fn ten_files_keep_every_byte_and_value() {
     let Some(corpus) = assets::find("corpus") else { return };
-    let mut checked = 0;
+    let (mut checked, mut by_triangle) = (0, 0);
     for path in FILES.iter().map(|name| corpus.join(name)) {
         let file = GltfFile::open(&path).unwrap();
         let asset = sample_asset::quads(&file);
+        by_triangle += asset.triangle_tags.len();
         let target = same_container(&path);
         let outputs = write_vlm(&file, &asset, &target).unwrap();
         let before = fs::read(&path).unwrap();
@@ -144,6 +145,7 @@ fn ten_files_keep_every_byte_and_value() {
         checked += 1;
     }
     assert!(checked >= 10, "only {checked} files were there");
+    assert!(by_triangle > 0, "no file has tags by triangle");
     println!("{checked} files unchanged but for what was added");
 }
 

@@ -39,6 +39,13 @@ fn written_extensions_conform() {
             let primitive = &json["meshes"][mesh as usize]["primitives"][primitive as usize];
             schema("mesh.primitive").validate(&primitive["extensions"][EXTENSION]).unwrap();
         }
+        for tags in &asset.triangle_tags {
+            let primitive = &json["meshes"][tags.mesh as usize]["primitives"][tags.primitive as usize];
+            schema("mesh.primitive").validate(&primitive["extensions"][EXTENSION]).unwrap();
+        }
+        for &(node, _) in &asset.node_tags {
+            schema("node").validate(&json["nodes"][node as usize]["extensions"][EXTENSION]).unwrap();
+        }
     }
 }
 
@@ -94,5 +101,33 @@ fn broken_extensions_do_not_conform() {
         let mut broken = root.clone();
         *broken.pointer_mut(pointer).unwrap() = value;
         assert!(!schema.is_valid(&broken), "a wrong {pointer} conforms");
+    }
+}
+
+#[test]
+fn broken_tags_do_not_conform() {
+    let array = json!({ "accessor": 3, "digest": "0123456789abcdef0123456789abcdef" });
+    let (node, primitive) = (schema("node"), schema("mesh.primitive"));
+    for (schema, valid) in [
+        (&node, json!({ "vlms": ["a"] })),
+        (&node, json!({ "tag": 1 })),
+        (&node, json!({ "vlms": ["a"], "tag": 4_294_967_295_u32 })),
+        (&primitive, json!({ "tag": 1 })),
+        (&primitive, json!({ "triangleTags": array })),
+    ] {
+        schema.validate(&valid).unwrap_or_else(|error| panic!("{error}: {valid}"));
+    }
+    for (schema, broken) in [
+        (&node, json!({})),
+        (&node, json!({ "vlms": [] })),
+        (&node, json!({ "tag": 0 })),
+        (&node, json!({ "tag": 4_294_967_296_u64 })),
+        (&primitive, json!({})),
+        (&primitive, json!({ "tag": 0 })),
+        (&primitive, json!({ "triangleTags": [1, 0] })),
+        (&primitive, json!({ "triangleTags": { "accessor": 3 } })),
+        (&primitive, json!({ "tag": 1, "triangleTags": array })),
+    ] {
+        assert!(!schema.is_valid(&broken), "{broken} conforms");
     }
 }

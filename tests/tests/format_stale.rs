@@ -57,8 +57,18 @@ fn renumbered_accessors_are_named() {
         swap,
         &["accessor 2 `lights/positions` was renumbered or altered", "accessor 4 `lights/albedo`"],
     );
-    let remove = |json: &mut Value| drop(json["accessors"].as_array_mut().unwrap().pop());
-    assert_stale(remove, &["/extensions/VLM_virtual_light_mesh/grid/entries", "is no index into /accessors"]);
+    let remove = |json: &mut Value| {
+        let accessors = json["accessors"].as_array_mut().unwrap();
+        accessors.truncate(accessors.len() - 2);
+    };
+    assert_stale(
+        remove,
+        &[
+            "/extensions/VLM_virtual_light_mesh/grid/entries",
+            "/meshes/1/primitives/0/extensions/VLM_virtual_light_mesh/triangleTags",
+            "is no index into /accessors",
+        ],
+    );
 }
 
 #[test]
@@ -102,6 +112,12 @@ fn lost_and_doubled_references_are_named() {
     assert_stale(unknown, &["`x`: `Spare` refers to it, but it does not exist"]);
     let root = |json: &mut Value| drop(json["extensions"].as_object_mut().unwrap().remove(EXTENSION));
     assert_stale(root, &["`Room/Table` refers to a VLM, but another tool removed the root object"]);
+    let all_but_a_tag = |json: &mut Value| {
+        root(json);
+        json["nodes"][1].as_object_mut().unwrap().remove("extensions");
+        json["nodes"][2].as_object_mut().unwrap().remove("extensions");
+    };
+    assert_stale(all_but_a_tag, &["`Spare` has a tag of a VLM, but another tool removed the root object"]);
 }
 
 #[test]

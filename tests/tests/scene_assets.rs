@@ -60,9 +60,13 @@ fn check(scene: &Scene) {
     assert!(scene.vertex_normals.iter().all(|n| n.is_normalized()));
     assert!(scene.triangles.iter().flatten().all(|&v| (v as usize) < vertices));
     assert_eq!(scene.triangle_primitive.len(), scene.triangles.len());
+    assert_eq!(scene.triangle_in_primitive.len(), scene.triangles.len());
     for (p, primitive) in scene.primitives.iter().enumerate() {
         let [first, count] = primitive.triangles.map(|n| n as usize);
         assert!(scene.triangle_primitive[first..first + count].iter().all(|&owner| owner as usize == p));
+        let numbers = &scene.triangle_in_primitive[first..first + count];
+        assert!(numbers.is_sorted_by(|a, b| a < b));
+        assert!(numbers.last().is_none_or(|&last| last < primitive.drawn_triangles));
         assert!((primitive.object as usize) < scene.objects.len());
         assert!((primitive.material as usize) < scene.materials.len());
     }

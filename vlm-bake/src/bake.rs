@@ -8,22 +8,25 @@ use vlm_format::{Grid, VlmAsset};
 
 use crate::authored;
 use crate::clearance::required_clearance;
+use crate::correspondence::{Correspondence, Light, Standing};
 use crate::decimate::{Decimation, LightMesh, decimate};
 use crate::grid::grid;
-use crate::offset::offset;
+use crate::mend::mend;
+use crate::offset::Surroundings;
 use crate::options::BakeOptions;
 use crate::patches::{Patches, patches};
 use crate::progress::Progress;
-use crate::refine::{Light, refine};
+use crate::refine::{Refiner, Snap};
 use crate::report::{AreaReport, DecimationReport, GridReport, OffsetReport, Report};
 use crate::samples::{BakedLight, Sources, samples};
 use crate::scene::Scene;
 use crate::signed_distance::IslandDistance;
 use crate::slivers::MAX_ASPECT;
-use crate::surface::{Standing, SurfacePoint, hand_on, spread_points, stand_ins};
+use crate::surface::{SurfacePoint, feature_points, spread_points};
 use crate::tag::{Tags, tag};
 use crate::topology::aspect_ratio;
-use crate::verify::{ClearanceReport, Evidence, Violation, sink, verify};
+use crate::verify::{ClearanceReport, Evidence, Violation, verify};
+use crate::way_out::WayOut;
 use crate::write::{assemble, order, placeable};
 
 /// A face stands for surface at most this share of the scene's extent away, on top of four times the decimation's error.
@@ -33,8 +36,11 @@ const REACH_SHARE: f64 = 0.02;
 /// hide more lights behind bumpy surface instead of tagging them, and put all of them deeper there, where they fit their surface less.
 const DEEPEST: f64 = 4.0;
 
-/// The least number of surface points of a bake: small budgets are tested as finely as medium ones.
+/// The least number of surface points by which lights are placed: small budgets are as fine as medium ones.
 const LEAST_POINTS: usize = 20_000;
+
+/// The least number of area-uniform points of the final check.
+const LEAST_CHECK_POINTS: usize = 200_000;
 
 /// An asset and how it came about.
 #[derive(Clone, Debug, Default)]
@@ -81,37 +87,53 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     }
 
     clock.stage("decimate");
-    let (mut mesh, decimation) = decimate(&patches, options);
+    #[allow(clippy::clone_on_copy)]
+    let (mesh, decimation) = decimate(&patches, options);
 
-    clock.stage("offset");
+    clock.stage("mend");
     let clearance = required_clearance(scene.bounds().unwrap_or_default());
+    let reach = reach(scene, &decimation);
     let points = spread_points(&patches, point_count(options));
-    let stand_ins = stand_ins(&points, &patches, &mesh, reach(scene, &decimation));
-    let of_faces = Standing::new(&stand_ins, mesh.faces.len());
+    let points = check_points(&patches, points, options);
     let distance = IslandDistance::new(&patches);
-    let deepest = DEEPEST * (clearance + mean_distance(&points, &stand_ins, &mesh));
-    let moved = offset(&mut mesh, &patches, &points, &of_faces, &distance, clearance, deepest);
-
-    clock.stage("refine");
-    let density = densities(scene, &patches, &mesh, &of_faces);
-    let mut lights =
-        refine(&mesh, &density, (options.lights as usize).saturating_sub(authored::count(scene)));
-    let of_lights = Standing::new(&hand_on(&points, &of_faces, &lights), lights.len());
+    let way_out = WayOut::new(scene, &patches);
+    let coarse = mesh.lights();
+    let light_of_point = Correspondence::new(&patches, &coarse, reach, |_| true).of(&points);
+    let deepest = std::env::var("DEEP").ok().and_then(|d| d.parse().ok()).unwrap_or(DEEPEST) * (clearance + mean_distance(&points, &light_of_point, &coarse));
+    let around =
+        Surroundings { patches: &patches, points: &points, clearance, reach, deepest, way_out: &way_out };
+    let snap = Snap::new(&patches);
+    let density = densities(scene, &patches, &mesh, &Standing::new(&light_of_point, coarse.len()));
+    let budget = (options.lights as usize).saturating_sub(authored::count(scene));
+    let hidden = mend(Refiner::new(mesh, density, &snap), budget, &around, &distance);
+    let lights = hidden.lights;
 
     clock.stage("verify");
+    let light_of_point = Correspondence::new(&patches, &lights, reach, |_| true).of(&points);
+    let standing = Standing::new(&light_of_point, lights.len());
     let evidence = Evidence {
         patches: &patches,
-        mesh: &mesh,
         points: &points,
-        standing: &of_lights,
+        standing: &standing,
         distance: &distance,
+        way_out: &way_out,
         clearance,
     };
-    sink(&mut lights, &evidence, deepest);
     let violations = verify(&lights, &evidence);
+    if std::env::var("DBG").is_ok() {
+        eprintln!("regions {} islands {} triangles {} decimation {decimation:?} mean distance {:.4}", patches.regions.len(), patches.islands, patches.triangles.len(), mean_distance(&points, &light_of_point, &lights));
+        let total: f64 = lights.iter().map(Light::area).sum();
+        let mut by: BTreeMap<[bool; 3], (u32, f64, Vec<f64>)> = BTreeMap::new();
+        for v in &violations {
+            let e = by.entry(v.dbg).or_default();
+            e.0 += 1; e.1 += lights[v.light as usize].area()/total*100.0; e.2.push(v.depth/clearance);
+        }
+        for (k, (n, a, mut d)) in by { d.sort_by(f64::total_cmp); eprintln!("lit,between,beside={k:?} n={n} area={a:.2}% depth/c p10 {:.2} p50 {:.2} p90 {:.2}; deepest/c {:.1}", d[d.len()/10], d[d.len()/2], d[d.len()*9/10], deepest/clearance); }
+        for v in violations.iter().take(3) { let l=&lights[v.light as usize]; eprintln!("{v:?}\n   {:?} n {:?} aspect {:.1} len/c {:.1}", l.corners, l.normal(), aspect_ratio(l.corners), l.corners[0].distance(l.corners[1])/clearance); }
+    }
 
     clock.stage("tag");
-    let mut tags = tag(scene, &patches, &mesh, &lights, &violations);
+    let mut tags = tag(scene, &patches, &lights, &violations);
     let clearance_report = remaining(scene, &evidence, &lights, &violations, &tags);
 
     clock.stage("samples");
@@ -119,12 +141,12 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let sources = Sources {
         scene,
         patches: &patches,
-        mesh: &mesh,
+        group: &hidden.coarse,
         tags: &light_tags,
         points: &points,
-        of_faces: &of_faces,
-        of_lights: &of_lights,
+        standing: &standing,
     };
+    let offset = offset_report(&lights, &hidden.depths);
     let mut lights = samples(&sources, &lights, options.samples);
 
     clock.stage("authored");
@@ -146,14 +168,14 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
         visible_triangles: scene.triangles.len(),
         asked_lights: options.lights,
         decimation: decimation.into(),
-        offset: offset_report(&mesh, &moved.vertex_moved),
+        offset,
         clearance: ClearanceReport {
             samples: points.len() as u64 + authored_check.samples,
             required_m: clearance,
             ..clearance_report
         },
         tags: tags.report(),
-        area: area_report(&points, &stand_ins, &lights),
+        area: area_report(&points, &light_of_point, &lights),
         grid: grid_report(grid.as_ref()),
         notes: notes(scene, authored_dropped),
         ..Report::default()
@@ -177,9 +199,8 @@ fn remaining(
 ) -> ClearanceReport {
     let mut report = ClearanceReport::default();
     for violation in violations {
-        let face = lights[violation.light as usize].face;
-        let primitive =
-            evidence.patches.regions[evidence.mesh.faces[face as usize].region as usize].primitive;
+        let region = lights[violation.light as usize].region;
+        let primitive = evidence.patches.regions[region as usize].primitive;
         let tag = tags.lights[violation.light as usize];
         if tag == 0 || tag != tags.of_primitive(scene, primitive) {
             report.violations += u64::from(violation.points) + u64::from(violation.pokes_out);
@@ -203,6 +224,14 @@ fn notes(scene: &Scene, authored_dropped: usize) -> Vec<String> {
     notes
 }
 
+/// The points of the final check: those of the mending or more, and every vertex and edge.
+fn check_points(patches: &Patches, points: Vec<SurfacePoint>, options: &BakeOptions) -> Vec<SurfacePoint> {
+    let count = point_count(options).max(LEAST_CHECK_POINTS);
+    let mut points = if count > point_count(options) { spread_points(patches, count) } else { points };
+    points.extend(feature_points(patches));
+    points
+}
+
 fn point_count(options: &BakeOptions) -> usize {
     (options.lights as usize * options.tests_per_light as usize).max(LEAST_POINTS)
 }
@@ -213,14 +242,17 @@ fn reach(scene: &Scene, decimation: &Decimation) -> f64 {
     REACH_SHARE * extent + 4.0 * decimation.error_m
 }
 
-/// The mean distance of points from the planes of the faces that stand for them, metres.
-fn mean_distance(points: &[SurfacePoint], stand_ins: &[Option<u32>], mesh: &LightMesh) -> f64 {
-    let distance = |(point, face): (&SurfacePoint, &Option<u32>)| {
-        let face = (*face)? as usize;
-        Some((point.position - mesh.corners(face)[0]).dot(mesh.normal(face)).abs())
+/// The mean distance of points from the planes of the lights that stand for them, metres.
+fn mean_distance(points: &[SurfacePoint], light_of_point: &[Option<u32>], lights: &[Light]) -> f64 {
+    let distance = |(point, light): (&SurfacePoint, &Option<u32>)| {
+        let light = &lights[(*light)? as usize];
+        Some((point.position - light.corners[0]).dot(light.normal()).abs())
     };
-    let (sum, count) =
-        points.iter().zip(stand_ins).filter_map(distance).fold((0.0, 0.0), |(sum, n), d| (sum + d, n + 1.0));
+    let (sum, count) = points
+        .iter()
+        .zip(light_of_point)
+        .filter_map(distance)
+        .fold((0.0, 0.0), |(sum, n), d| (sum + d, n + 1.0));
     if count > 0.0 { sum / count } else { 0.0 }
 }
 
@@ -241,18 +273,19 @@ impl From<Decimation> for DecimationReport {
     }
 }
 
-fn offset_report(mesh: &LightMesh, moved: &[f64]) -> OffsetReport {
-    let mut used: Vec<u32> = mesh.faces.iter().flat_map(|f| f.vertices).collect();
-    used.sort_unstable();
-    used.dedup();
-    let of = |v: &u32| moved[*v as usize];
-    let mean_m = used.iter().map(of).sum::<f64>() / used.len().max(1) as f64;
-    OffsetReport { mean_m, max_m: used.iter().map(of).fold(0.0, f64::max) }
+/// The mean is weighted by area: small lights are many, and count little.
+fn offset_report(lights: &[Light], depths: &[f64]) -> OffsetReport {
+    let area: f64 = lights.iter().map(Light::area).sum();
+    let weighed: f64 = lights.iter().zip(depths).map(|(light, depth)| light.area() * depth).sum();
+    OffsetReport {
+        mean_m: weighed / area.max(f64::MIN_POSITIVE),
+        max_m: depths.iter().copied().fold(0.0, f64::max),
+    }
 }
 
-fn area_report(points: &[SurfacePoint], stand_ins: &[Option<u32>], lights: &[BakedLight]) -> AreaReport {
+fn area_report(points: &[SurfacePoint], light_of_point: &[Option<u32>], lights: &[BakedLight]) -> AreaReport {
     let of = |l: &BakedLight| 0.5 * crate::topology::cross_of(l.corners).length();
-    let uncovered = points.iter().zip(stand_ins).filter(|(_, face)| face.is_none());
+    let uncovered = points.iter().zip(light_of_point).filter(|(_, light)| light.is_none());
     AreaReport {
         visible_m2: points.iter().map(|p| p.area).sum(),
         uncovered_m2: uncovered.map(|(p, _)| p.area).sum(),

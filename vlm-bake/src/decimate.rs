@@ -8,6 +8,7 @@ use glam::DVec3;
 use meshopt::SimplifyOptions;
 use rustc_hash::FxHashMap;
 
+use crate::correspondence::Light;
 use crate::options::BakeOptions;
 use crate::patches::Patches;
 use crate::planar::merge_coplanar;
@@ -32,6 +33,8 @@ pub struct Face {
     pub region: u32,
     /// The back of a two-sided surface.
     pub back: bool,
+    /// The face of the decimated mesh of which this is a part: itself until it is refined.
+    pub coarse: u32,
 }
 
 impl LightMesh {
@@ -39,6 +42,17 @@ impl LightMesh {
     #[must_use]
     pub fn corners(&self, face: usize) -> [DVec3; 3] {
         self.faces[face].vertices.map(|v| self.positions[v as usize])
+    }
+
+    /// The faces as lights.
+    #[must_use]
+    pub fn lights(&self) -> Vec<Light> {
+        let light = |(f, face): (usize, &Face)| Light {
+            corners: self.corners(f),
+            region: face.region,
+            back: face.back,
+        };
+        self.faces.iter().enumerate().map(light).collect()
     }
 
     /// Area of a face in square metres.
@@ -157,6 +171,7 @@ impl SimplifierInput {
                 vertices: [0, 1, 2].map(|i| self.vertex_welded[corners[i] as usize]),
                 region: self.vertex_region[corners[0] as usize],
                 back: false,
+                coarse: 0,
             })
             .filter(|f| {
                 f.vertices[0] != f.vertices[1]

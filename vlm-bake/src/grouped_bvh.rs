@@ -6,7 +6,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use crate::bvh::{Bvh, Nearest};
+use crate::bvh::{Bvh, Hit, Nearest};
 
 /// Trees over the triangles of each group, relative to a common origin, so that single precision keeps its digits far from
 /// the world's.
@@ -54,6 +54,24 @@ impl GroupedBvh {
         let local = (p - self.origin).as_vec3();
         let near = bvh.closest(local, max_distance as f32, |i| accept(members[i as usize]))?;
         Some(Nearest { triangle: members[near.triangle as usize], ..near })
+    }
+
+    /// The triangle of a group that a ray from `p` along `direction` (unit) meets first, among those that `accept` lets through, within
+    /// `max_distance` metres; with the distance.
+    #[must_use]
+    pub fn hit(
+        &self,
+        group: u32,
+        p: DVec3,
+        direction: DVec3,
+        max_distance: f64,
+        accept: impl Fn(u32) -> bool,
+    ) -> Option<(u32, f64)> {
+        let (bvh, members) = self.groups.get(group as usize)?;
+        let local = (p - self.origin).as_vec3();
+        let accept = |hit: &Hit| accept(members[hit.triangle as usize]);
+        let hit = bvh.hit_where(local, direction.as_vec3(), max_distance as f32, accept)?;
+        Some((members[hit.triangle as usize], f64::from(hit.distance)))
     }
 
     /// What the points of answers are relative to.

@@ -1,7 +1,7 @@
 //! Bakes Virtual Light Meshes from glTF, and renders them on the CPU.
 //!
 //! Stages of the bake, in the order in which data flows:
-//! `scene -> patches -> decimate -> offset -> refine -> verify -> tag -> samples -> authored -> grid -> write`.
+//! `scene -> patches -> decimate -> refine, offset, mend -> verify -> tag -> samples -> authored -> grid -> write`.
 //! For pictures on the CPU: `scene, bvh -> camera -> shade -> gbuffer -> reference | render -> picture`.
 
 pub mod options;
@@ -15,10 +15,13 @@ pub mod decimate;
 pub mod planar;
 pub mod slivers;
 pub mod surface;
+pub mod correspondence;
 pub mod clearance;
 pub mod signed_distance;
-pub mod offset;
+pub mod way_out;
 pub mod refine;
+pub mod offset;
+pub mod mend;
 pub mod verify;
 pub mod tag;
 pub mod samples;

@@ -1,137 +1,250 @@
-//! Stage 4: moves each vertex inward, by the least displacement that puts its faces behind the surface they stand for.
+//! Stage 5: moves each vertex inward, by the least displacement that hides its lights from the surface for which they stand.
 //!
-//! Decimating a convex part already falls inside, a concave part pokes out in front. With `N` the face's normal, a point `x` for
-//! which it stands lies at height `N . (x - v)` over the face, so the face must sink by
+//! A light with corners `v` does not light a surface point `x` with normal `n` if all corners lie below the horizon of `x`:
 //! ```text
-//! depth = max_x N . (v - x) + clearance
+//! n . (v - x) <= -clearance      for every corner v and every point x for which the light stands
 //! ```
-//! A vertex belongs to several faces; it moves by the shortest `delta` with `N_f . delta <= -depth_f` for each: a quadratic
-//! program in three unknowns, solved by Hildreth's row action (1957). At the corner of a room that is the mitre of its
-//! three walls; lights stay joined and cover the corner.
+//! That is linear in the displacement `delta` of a vertex, and the same for all points of one triangle of the surface: the
+//! vertex must lie below the planes of the triangles for which its lights stand. The least such displacement,
+//! ```text
+//! min |delta|^2   with   n_i . delta <= -(clearance + n_i . (v - x_i))   for each plane i,
+//! ```
+//! is a quadratic program in three unknowns, held by at most three of the planes; they come in one by one, the one that lies deepest below
+//! the vertex first, and each lengthens the displacement (an LP-type problem: Sharir and Welzl 1992). On a convex surface the vertices of a
+//! decimated mesh lie below all planes but their own, and move by the clearance; at the corner of a room that is the mitre of its
+//! walls; in a hollow they move until no chord stands out. Vertices are shared, so lights stay joined.
+//!
+//! A point may also lie behind its light, in a recess that decimation bridged: no plane is needed for it. So planes are
+//! added only where a light in its present place lights a point, and the programs are solved anew, until no light does.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
+use crate::clearance::self_lighting;
+use crate::correspondence::{Correspondence, Light, Standing};
 use crate::decimate::LightMesh;
 use crate::patches::Patches;
-use crate::signed_distance::IslandDistance;
-use crate::surface::{Standing, SurfacePoint};
+use crate::surface::SurfacePoint;
+use crate::way_out::WayOut;
 
 /// Lights are moved this much farther than the clearance that `verify` asks for, so that rounding on the way does not fail it.
-const MARGIN: f64 = 1.25;
+const MARGIN: f64 = 1.02;
 
-/// A vertex moves by at most this many times the greatest depth of its faces. Higher values keep blades of faces that meet at acute
-/// angles joined, and push their lights out of thin objects; lower values leave such edges to be mended one face at a time.
-const MITRE_LIMIT: f64 = 4.0;
+/// Rounds of moving and looking. Planes come in as lights move, so a few are needed; what is not hidden by then is
+/// refined or tagged.
+const ROUNDS: usize = 6;
 
-/// Rounds of moving and looking; each deepens the faces that still lie in front of their surface.
-const ROUNDS: usize = 3;
+/// A vertex counts as below a plane where it misses it by less than this share of the clearance; the margin makes up for it.
+const TOLERANCE: f64 = 0.005;
 
-/// What `offset` did.
-#[derive(Clone, Debug, Default)]
-pub struct Offset {
-    /// How far each vertex moved, metres.
-    pub vertex_moved: Vec<f64>,
+/// What the offset looks at.
+pub struct Surroundings<'a> {
+    /// The visible surface.
+    pub patches: &'a Patches,
+    /// Points on it.
+    pub points: &'a [SurfacePoint],
+    /// Required distance behind the surface, metres.
+    pub clearance: f64,
+    /// Lights stand for surface at most this far away, metres.
+    pub reach: f64,
+    /// No vertex moves farther than this, metres.
+    pub deepest: f64,
+    /// Ways out of the far side of an object.
+    pub way_out: &'a WayOut,
 }
 
-/// Moves the vertices of `mesh` inward, each face by the clearance at least and `deepest` at most (metres). Faces of two-sided surfaces stay where they are: no place behind hides them, so they are
-/// tagged later.
-pub fn offset(
-    mesh: &mut LightMesh,
-    patches: &Patches,
-    points: &[SurfacePoint],
-    standing: &Standing,
-    distance: &IslandDistance,
-    clearance: f64,
-    deepest: f64,
-) -> Offset {
-    let target = MARGIN * clearance;
-    let rest = mesh.positions.clone();
-    let normals: Vec<DVec3> = (0..mesh.faces.len()).map(|f| mesh.normal(f)).collect();
-    let incident = incident_faces(mesh, patches);
-    let lack = |mesh: &LightMesh, f: usize| {
-        let own = standing.of(f).iter().map(|&p| points[p as usize].position);
-        let face = mesh.positions[mesh.faces[f].vertices[0] as usize];
-        // A point deeper than that lies in a recess that decimation bridged: behind the light, and so unlit by it.
-        own.map(|x| (face - x).dot(normals[f]) + target).filter(|&lack| lack <= deepest).fold(0.0, f64::max)
-    };
-    let mut depth: Vec<f64> =
-        (0..mesh.faces.len()).into_par_iter().map(|f| lack(mesh, f).max(target)).collect();
+/// One plane below which a vertex must lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Plane {
+    /// Unit normal, out of the surface.
+    normal: DVec3,
+    /// How far the vertex, at rest, must sink along the normal; metres.
+    depth: f64,
+    /// The triangle of the patches that lies in it; `u32::MAX` for the plane of a face.
+    triangle: u32,
+}
+
+/// Moves the vertices of `mesh` from their places of rest. `emits` is false for faces that make no lights. Faces of two-sided
+/// surfaces stay where they are: no place behind hides them, so they are tagged later.
+pub fn offset(mesh: &mut LightMesh, rest: &[DVec3], emits: &[bool], around: &Surroundings) {
+    let mut planes = face_planes(mesh, rest, emits, around);
+    let mut dirty: Vec<u32> = (0..rest.len() as u32).collect();
     for _ in 0..ROUNDS {
-        displace(mesh, &rest, &normals, &depth, &incident);
-        pull_inside(mesh, patches, &incident, distance, target);
-        let lacking: Vec<f64> = (0..mesh.faces.len()).into_par_iter().map(|f| lack(mesh, f)).collect();
-        if lacking.iter().all(|&lack| lack < target - clearance) {
+        settle(mesh, rest, &planes, &dirty, around);
+        let found = crossed_planes(mesh, rest, emits, around);
+        dirty.clear();
+        for (vertex, plane) in found {
+            let known = &mut planes[vertex as usize];
+            if !known.iter().any(|k| k.triangle == plane.triangle) {
+                known.push(plane);
+                dirty.push(vertex);
+            }
+        }
+        dirty.dedup();
+        if dirty.is_empty() {
             break;
         }
-        for (depth, lack) in depth.iter_mut().zip(lacking) {
-            *depth = (*depth + lack).min(deepest);
-        }
     }
-    let vertex_moved = mesh.positions.iter().zip(&rest).map(|(moved, at)| moved.distance(*at)).collect();
-    Offset { vertex_moved }
 }
 
-/// The faces that constrain each vertex: those of one-sided surfaces.
-fn incident_faces(mesh: &LightMesh, patches: &Patches) -> Vec<Vec<u32>> {
-    let mut incident = vec![Vec::new(); mesh.positions.len()];
+/// To begin with, each vertex lies below the planes of its faces.
+fn face_planes(mesh: &LightMesh, rest: &[DVec3], emits: &[bool], around: &Surroundings) -> Vec<Vec<Plane>> {
+    let mut planes = vec![Vec::new(); rest.len()];
     for (f, face) in mesh.faces.iter().enumerate() {
-        if !patches.regions[face.region as usize].two_sided {
-            for v in face.vertices {
-                incident[v as usize].push(f as u32);
+        if !emits[f] || around.patches.regions[face.region as usize].two_sided {
+            continue;
+        }
+        let corners = face.vertices.map(|v| rest[v as usize]);
+        let normal = crate::topology::cross_of(corners).normalize_or_zero();
+        for v in face.vertices {
+            planes[v as usize].push(Plane { normal, depth: MARGIN * around.clearance, triangle: u32::MAX });
+        }
+    }
+    planes
+}
+
+/// The planes above which corners of lights lie that light points of these planes, by vertex.
+fn crossed_planes(
+    mesh: &LightMesh,
+    rest: &[DVec3],
+    emits: &[bool],
+    around: &Surroundings,
+) -> Vec<(u32, Plane)> {
+    let lights = mesh.lights();
+    let correspondence = Correspondence::new(around.patches, &lights, around.reach, |l| emits[l]);
+    let standing = Standing::new(&correspondence.of(around.points), lights.len());
+    let crossed = |l: usize| {
+        let face = mesh.faces[l];
+        let two_sided = around.patches.regions[face.region as usize].two_sided;
+        let own = if two_sided { &[] } else { standing.of(l) };
+        planes_of_light(&lights[l], face.vertices, own, rest, around)
+    };
+    let mut found: Vec<(u32, Plane)> = (0..lights.len()).into_par_iter().flat_map_iter(crossed).collect();
+    found.par_sort_by_key(|(vertex, plane)| (*vertex, plane.triangle));
+    found.dedup_by_key(|(vertex, plane)| (*vertex, plane.triangle));
+    found
+}
+
+fn planes_of_light(
+    light: &Light,
+    vertices: [u32; 3],
+    own: &[u32],
+    rest: &[DVec3],
+    around: &Surroundings,
+) -> Vec<(u32, Plane)> {
+    let normal = light.normal();
+    let target = MARGIN * around.clearance;
+    let mut found = Vec::new();
+    for point in own.iter().map(|&p| &around.points[p as usize]) {
+        if self_lighting(&light.corners, normal, point, around.clearance) <= 0.0 {
+            continue;
+        }
+        for (corner, v) in light.corners.into_iter().zip(vertices) {
+            if (corner - point.position).dot(point.normal) > -target {
+                let depth = target + (rest[v as usize] - point.position).dot(point.normal);
+                found.push((v, Plane { normal: point.normal, depth, triangle: point.triangle }));
             }
         }
     }
-    incident
+    found
 }
 
-/// Moves every vertex from its place of rest to satisfy the depths of its faces.
-fn displace(mesh: &mut LightMesh, rest: &[DVec3], normals: &[DVec3], depth: &[f64], incident: &[Vec<u32>]) {
-    mesh.positions.par_iter_mut().zip(rest).zip(incident).for_each(|((position, at), faces)| {
-        *position =
-            *at + shortest_displacement(faces.iter().map(|&f| (normals[f as usize], depth[f as usize])));
-    });
+/// Moves some vertices from rest to where their planes want them.
+fn settle(mesh: &mut LightMesh, rest: &[DVec3], planes: &[Vec<Plane>], dirty: &[u32], around: &Surroundings) {
+    let place = |&v: &u32| {
+        let at = rest[v as usize];
+        let planes: Vec<Plane> =
+            planes[v as usize].iter().filter(|p| p.depth <= around.deepest).copied().collect();
+        (v, at + displacement(at, planes, around))
+    };
+    let moved: Vec<(u32, DVec3)> = dirty.par_iter().map(place).collect();
+    for (v, p) in moved {
+        mesh.positions[v as usize] = p;
+    }
 }
 
-/// The shortest `delta` with `n . delta <= -d` for each `(n, d)`, within the mitre limit.
-fn shortest_displacement(constraints: impl Iterator<Item = (DVec3, f64)>) -> DVec3 {
-    let constraints: Vec<(DVec3, f64)> = constraints.filter(|(n, _)| *n != DVec3::ZERO).collect();
-    let mut multiplier = vec![0.0; constraints.len()];
+/// The least displacement below as many of the planes as the depth allowed and the object's thickness permit: where it would be too
+/// long, or come out on another side, the plane that asks for most is given up.
+fn displacement(at: DVec3, mut planes: Vec<Plane>, around: &Surroundings) -> DVec3 {
+    let longest = around.deepest.max(2.0 * around.clearance);
+    let tolerance = TOLERANCE * around.clearance;
     let mut delta = DVec3::ZERO;
-    for _ in 0..100 {
-        let mut worst: f64 = 0.0;
-        for ((n, d), lambda) in constraints.iter().zip(&mut multiplier) {
-            let excess = n.dot(delta) + d;
-            let step = excess.max(-*lambda);
-            *lambda += step;
-            delta -= *n * step;
-            worst = worst.max(excess / d.max(f64::MIN_POSITIVE));
+    let mut binding: Vec<Plane> = Vec::new();
+    // Each step takes one plane in or gives one up.
+    for _ in 0..4 * planes.len() + 4 {
+        let above = |plane: &Plane| plane.normal.dot(delta) + plane.depth;
+        let worst = (0..planes.len()).max_by(|&a, &b| above(&planes[a]).total_cmp(&above(&planes[b])));
+        let mut candidates = binding.clone();
+        match worst {
+            Some(worst) if above(&planes[worst]) > tolerance => candidates.push(planes.swap_remove(worst)),
+            _ if stays_inside(at, delta, around) => return delta,
+            _ => give_up_deepest(&mut candidates),
         }
-        if worst < 1e-3 {
-            break;
+        let solution = loop {
+            match below(&candidates, tolerance) {
+                Some(solution) if solution.0.length() <= longest => break solution,
+                _ => give_up_deepest(&mut candidates),
+            }
+        };
+        let kept;
+        (delta, kept) = solution;
+        binding.clear();
+        for (plane, kept) in candidates.into_iter().zip(kept) {
+            if kept { binding.push(plane) } else { planes.push(plane) }
         }
     }
-    delta.clamp_length_max(MITRE_LIMIT * constraints.iter().map(|c| c.1).fold(0.0, f64::max))
+    DVec3::ZERO
 }
 
-/// Pulls back the vertices that came out on another side of their island.
-fn pull_inside(
-    mesh: &mut LightMesh,
-    patches: &Patches,
-    incident: &[Vec<u32>],
-    distance: &IslandDistance,
-    clearance: f64,
-) {
-    let faces = &mesh.faces;
-    mesh.positions.par_iter_mut().zip(incident).for_each(|(position, incident)| {
-        let Some(&face) = incident.first() else { return };
-        let island = patches.regions[faces[face as usize].region as usize].island;
-        if let Some(near) = distance.at(*position, island)
-            && near.signed > -0.8 * clearance
-        {
-            *position -= near.normal * (near.signed + clearance);
+fn give_up_deepest(planes: &mut Vec<Plane>) {
+    let deepest = (0..planes.len()).max_by(|&a, &b| planes[a].depth.total_cmp(&planes[b].depth));
+    if let Some(deepest) = deepest {
+        planes.swap_remove(deepest);
+    }
+}
+
+/// True if a vertex that moves so does not come out on another side, with room for the clearance.
+fn stays_inside(at: DVec3, delta: DVec3, around: &Surroundings) -> bool {
+    let Some(direction) = delta.try_normalize() else { return true };
+    let start = at + direction * around.way_out.least_length();
+    !around.way_out.leads_out(start, at + delta + direction * (0.5 * around.clearance), |_| false)
+}
+
+/// The shortest `delta` with `normal . delta <= -depth` for each of at most four planes, and which of them hold it there; `None` if
+/// there is none.
+///
+/// In three dimensions at most three planes do. So some subset's solution with equality, `delta = -sum_i lambda_i n_i`,
+/// satisfies the conditions of Karush, Kuhn and Tucker: no `lambda` below 0, and no plane missed.
+fn below(planes: &[Plane], tolerance: f64) -> Option<(DVec3, [bool; 4])> {
+    (0..1u32 << planes.len()).filter(|subset| subset.count_ones() <= 3).find_map(|subset| {
+        let kept = [0, 1, 2, 3].map(|i| subset >> i & 1 == 1);
+        let of: Vec<&Plane> = planes.iter().zip(kept).filter(|(_, kept)| *kept).map(|(p, _)| p).collect();
+        let delta = touching(&of)?;
+        let missed = planes.iter().any(|p| p.normal.dot(delta) + p.depth > tolerance);
+        (!missed).then_some((delta, kept))
+    })
+}
+
+/// The shortest `delta` with `normal . delta = -depth` for each plane, if each of them pushes it inward.
+fn touching(planes: &[&Plane]) -> Option<DVec3> {
+    let inward = |pushes: &[f64]| pushes.iter().all(|&push| push >= 0.0 && push.is_finite());
+    match *planes {
+        [] => Some(DVec3::ZERO),
+        [a] => inward(&[a.depth]).then(|| -a.normal * a.depth),
+        [a, b] => {
+            let cosine = a.normal.dot(b.normal);
+            let squared_sine = 1.0 - cosine * cosine;
+            let pushes = [a.depth - cosine * b.depth, b.depth - cosine * a.depth].map(|p| p / squared_sine);
+            inward(&pushes).then(|| -a.normal * pushes[0] - b.normal * pushes[1])
         }
-    });
+        [a, b, c] => {
+            let normals = DMat3::from_cols(a.normal, b.normal, c.normal);
+            let delta = normals.transpose().inverse() * -DVec3::new(a.depth, b.depth, c.depth);
+            let pushes = normals.inverse() * -delta;
+            (delta.is_finite() && inward(&pushes.to_array())).then_some(delta)
+        }
+        _ => None,
+    }
 }
 
 #[cfg(test)]
@@ -139,24 +252,33 @@ mod tests {
     use super::*;
     use glam::dvec3;
 
+    fn planes(of: &[(DVec3, f64)]) -> Vec<Plane> {
+        of.iter().map(|&(normal, depth)| Plane { normal, depth, triangle: 0 }).collect()
+    }
+
     #[test]
     fn a_corner_of_three_walls_moves_by_its_mitre() {
-        let walls = [(DVec3::X, 0.1), (DVec3::Y, 0.1), (DVec3::Z, 0.1)];
-        let moved = shortest_displacement(walls.into_iter());
-        assert!(moved.distance(DVec3::splat(-0.1)) < 1e-6, "{moved}");
+        let walls = planes(&[(DVec3::X, 0.1), (DVec3::Y, 0.1), (DVec3::Z, 0.1)]);
+        let (moved, kept) = below(&walls, 0.0).unwrap();
+        assert!(moved.distance(DVec3::splat(-0.1)) < 1e-12, "{moved}");
+        assert_eq!(kept, [true, true, true, false]);
     }
 
     #[test]
     fn a_face_needs_no_more_than_its_depth() {
-        let moved = shortest_displacement([(DVec3::Z, 0.2), (DVec3::Z, 0.1)].into_iter());
-        assert!(moved.distance(dvec3(0.0, 0.0, -0.2)) < 1e-9);
+        let (moved, kept) = below(&planes(&[(DVec3::Z, 0.2), (DVec3::Z, 0.1)]), 0.0).unwrap();
+        assert!(moved.distance(dvec3(0.0, 0.0, -0.2)) < 1e-12);
+        assert_eq!(kept, [true, false, false, false]);
     }
 
     #[test]
-    fn opposite_walls_stop_at_the_limit() {
-        let moved = shortest_displacement(
-            [(DVec3::Z, 0.1), (dvec3(0.1, 0.0, -1.0).normalize_or_zero(), 0.1)].into_iter(),
-        );
-        assert!(moved.length() <= 0.4 + 1e-9);
+    fn a_plane_that_is_satisfied_moves_nothing() {
+        let (moved, _) = below(&planes(&[(DVec3::Z, 0.2), (DVec3::X, -0.3)]), 0.0).unwrap();
+        assert!(moved.distance(dvec3(0.0, 0.0, -0.2)) < 1e-12);
+    }
+
+    #[test]
+    fn nothing_lies_below_opposite_planes() {
+        assert!(below(&planes(&[(DVec3::Z, 0.2), (-DVec3::Z, 0.2)]), 1e-6).is_none());
     }
 }

@@ -224,30 +224,29 @@ pub fn gather_by_grid(
 }
 
 /// The virtual lights of an asset after phase 1: what every gathering method starts from.
-pub struct LitScene<'a> {
+pub struct LitScene {
     /// The lights in world space.
     pub lights: LightSet,
     /// Phase 1's result: radiosity of each light, lx.
     pub radiosity: Vec<Vec3>,
     /// Wall time of phase 1.
     pub inject_seconds: f64,
-    /// Tag of each of the scene's primitives, 0 for none.
-    primitive_tags: Vec<u32>,
-    scene: &'a Scene,
+    /// Tag of each of the scene's triangles, 0 for none.
+    triangle_tags: Vec<u32>,
 }
 
-impl<'a> LitScene<'a> {
+impl LitScene {
     /// Moves the lights into world space and runs phase 1.
     ///
     /// # Errors
     /// [`RenderError::UnknownNode`] if a VLM belongs to a node that the scene does not have.
-    pub fn new(trace: &TraceScene<'a>, asset: &VlmAsset) -> Result<Self, RenderError> {
+    pub fn new(trace: &TraceScene<'_>, asset: &VlmAsset) -> Result<Self, RenderError> {
         let lights = world_lights(trace.scene, asset)?;
         let start = Instant::now();
         let radiosity = inject(&lights, |position, normal| trace.direct_irradiance(position, normal, normal));
         let inject_seconds = start.elapsed().as_secs_f64();
-        let primitive_tags = primitive_tags(trace.scene, asset);
-        Ok(Self { lights, radiosity, inject_seconds, primitive_tags, scene: trace.scene })
+        let triangle_tags = triangle_tags(trace.scene, asset);
+        Ok(Self { lights, radiosity, inject_seconds, triangle_tags })
     }
 
     /// Phase 2 at every pixel by `gather`: indirect irradiance in lx, and what it took.
@@ -320,8 +319,7 @@ impl<'a> LitScene<'a> {
     }
 
     fn tag(&self, triangle: u32) -> u32 {
-        let primitive = self.scene.triangle_primitive.get(triangle as usize);
-        primitive.and_then(|&p| self.primitive_tags.get(p as usize)).copied().unwrap_or(0)
+        self.triangle_tags.get(triangle as usize).copied().unwrap_or(0)
     }
 }
 
@@ -337,10 +335,14 @@ pub fn world_lights(scene: &Scene, asset: &VlmAsset) -> Result<LightSet, RenderE
     Ok(LightSet::new(asset, |node| transform(node).unwrap_or(DMat4::IDENTITY)))
 }
 
-fn primitive_tags(scene: &Scene, asset: &VlmAsset) -> Vec<u32> {
-    let tag = |mesh: u32, primitive: u32| {
-        let found = asset.primitive_tags.binary_search_by_key(&(mesh, primitive), |&(m, p, _)| (m, p));
-        found.ok().and_then(|i| asset.primitive_tags.get(i)).map_or(0, |&(_, _, tag)| tag)
+/// The tag of each of the scene's triangles as a receiver, 0 for none.
+#[must_use]
+pub fn triangle_tags(scene: &Scene, asset: &VlmAsset) -> Vec<u32> {
+    let tag = |(&primitive, &triangle): (&u32, &u32)| {
+        let primitive = scene.primitives.get(primitive as usize)?;
+        let object = scene.objects.get(primitive.object as usize)?;
+        Some(asset.tag_of(object.node, primitive.mesh, primitive.primitive, triangle))
     };
-    scene.primitives.iter().map(|p| tag(p.mesh, p.primitive)).collect()
+    let places = scene.triangle_primitive.iter().zip(&scene.triangle_in_primitive);
+    places.map(|place| tag(place).unwrap_or(0)).collect()
 }

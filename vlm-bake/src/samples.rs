@@ -12,12 +12,10 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::f32::consts::PI;
 
-use crate::clearance::self_lighting;
-use crate::decimate::LightMesh;
+use crate::correspondence::{Light, Standing};
 use crate::patches::Patches;
-use crate::refine::Light;
 use crate::scene::{Scene, Steering};
-use crate::surface::{Standing, SurfacePoint};
+use crate::surface::SurfacePoint;
 
 /// The surface may be at most this many times as large as the light that stands for it: more would make that light a hot spot. What
 /// is cut off is lost.
@@ -67,30 +65,30 @@ pub struct Sources<'a> {
     pub scene: &'a Scene,
     /// Its patches.
     pub patches: &'a Patches,
-    /// The faces of which the lights are parts.
-    pub mesh: &'a LightMesh,
+    /// Per light, a number that it shares with the lights of its neighbourhood: parts of one face of the decimated mesh.
+    pub group: &'a [u32],
     /// Tag per light.
     pub tags: &'a [u32],
     /// Points on the visible surface.
     pub points: &'a [SurfacePoint],
-    /// Which of them each face stands for.
-    pub of_faces: &'a Standing,
     /// Which of them each light stands for.
-    pub of_lights: &'a Standing,
+    pub standing: &'a Standing,
 }
 
-/// The finished lights, each with at most `count` samples. `lights` are in the order of their faces.
+/// The finished lights, each with at most `count` samples. Lights without any surface are left out.
 #[must_use]
 pub fn samples(sources: &Sources, lights: &[Light], count: u32) -> Vec<BakedLight> {
-    // The ratio of areas is the face's: over one light, the number of points fluctuates too much.
-    let mut face_area: FxHashMap<u32, f64> = FxHashMap::default();
-    for light in lights {
-        *face_area.entry(light.face).or_default() += light.area();
+    // The ratio of areas is the group's: over one light, the number of points fluctuates too much.
+    let mut areas: FxHashMap<u32, [f64; 2]> = FxHashMap::default();
+    for (l, light) in lights.iter().enumerate() {
+        let own = sources.standing.of(l).iter();
+        let [surface, made] = areas.entry(sources.group[l]).or_default();
+        *surface += own.map(|&p| sources.points[p as usize].area).sum::<f64>();
+        *made += light.area();
     }
     let finish = |(l, light): (usize, &Light)| {
-        let of_face = sources.of_faces.of(light.face as usize);
-        let surface_area: f64 = of_face.iter().map(|&p| sources.points[p as usize].area).sum();
-        let ratio = (surface_area / face_area[&light.face]).min(MOST_AREA_RATIO) as f32;
+        let [surface, made] = areas[&sources.group[l]];
+        let ratio = (surface / made).min(MOST_AREA_RATIO) as f32;
         finish_light(sources, l, light, ratio, count as usize)
     };
     lights.par_iter().enumerate().filter_map(finish).collect()
@@ -104,8 +102,8 @@ fn finish_light(
     ratio: f32,
     count: usize,
 ) -> Option<BakedLight> {
-    let candidates = candidates(sources, number, light);
-    let region = sources.patches.regions[sources.mesh.faces[light.face as usize].region as usize];
+    let candidates = candidates(sources, number);
+    let region = sources.patches.regions[light.region as usize];
     let object = sources.scene.primitives[region.primitive as usize].object;
     let steering = &sources.scene.objects[object as usize].steering;
     let bare =
@@ -114,26 +112,19 @@ fn finish_light(
     (!finished.samples.is_empty() || finished.emission != Vec3::ZERO).then_some(finished)
 }
 
-/// The points of a light with the colours of the surface there, each the mean over the point's share of the area. A light that got
-/// none borrows the nearest point of its face that it does not light.
-fn candidates<'a>(sources: &Sources<'a>, number: usize, light: &Light) -> Vec<Candidate<'a>> {
+/// The points of a light with the colours of the surface there, each the mean over the point's share of the area. Points
+/// without area, at vertices and edges, count only where there is no other.
+fn candidates<'a>(sources: &Sources<'a>, number: usize) -> Vec<Candidate<'a>> {
     let coloured = |&p: &u32| {
         let point = &sources.points[p as usize];
         let triangle = sources.patches.triangle_source[point.triangle as usize];
         let surface = sources.scene.albedo_at(triangle as usize, point.barycentric, point.area as f32);
         Candidate { point, albedo: surface.reflectance(), emission: surface.emission * PI }
     };
-    let own = sources.of_lights.of(number);
-    if !own.is_empty() {
-        return own.iter().map(coloured).collect();
-    }
-    let centre = light.corners.iter().sum::<DVec3>() / 3.0;
-    let away = |p: &&u32| sources.points[**p as usize].position.distance_squared(centre);
-    let dark =
-        |p: &&u32| self_lighting(&light.corners, light.normal(), &sources.points[**p as usize], 0.0) <= 0.0;
-    let of_face = sources.of_faces.of(light.face as usize).iter().filter(dark);
-    let nearest = of_face.min_by(|a, b| away(a).total_cmp(&away(b)));
-    nearest.map(coloured).into_iter().collect()
+    let own = sources.standing.of(number);
+    let with_area = own.iter().filter(|&&p| sources.points[p as usize].area > 0.0);
+    let spread: Vec<Candidate> = with_area.map(coloured).collect();
+    if spread.is_empty() { own.iter().map(coloured).collect() } else { spread }
 }
 
 /// Finishes a light from its candidates.

@@ -1,19 +1,11 @@
-//! Points spread evenly over the visible surface, and the faces of the light mesh that stand for them.
+//! Points on the visible surface: spread evenly over its area, and at its vertices and edges.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
-use crate::bvh::Bvh;
-use crate::decimate::LightMesh;
-use crate::grouped_bvh::GroupedBvh;
 use crate::patches::Patches;
-use crate::refine::Light;
 use crate::topology::cross_of;
-
-/// A face stands only for points whose normal is at most this far (cosine) from its own. Lower values let a face stand
-/// for the side walls of what was decimated away, which it can never clear; higher values leave more of the surface without
-/// a light.
-const LEAST_COSINE: f64 = 0.8;
 
 /// A point on the visible surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,115 +80,67 @@ pub fn spread_over([a, b, c]: [DVec3; 3], count: u32) -> impl Iterator<Item = DV
     })
 }
 
-/// The face that stands for each point: the nearest of its own region, else of its island and primitive, that looks the
-/// same way. `None` where decimation left none within `reach` metres: the point's light is lost, and the report says how
-/// much.
+/// A point at every vertex and at the middle of every edge, on each side that reflects, once for each plane that meets there:
+/// where area-uniform points miss the extremes of a surface. They stand for no area.
 #[must_use]
-pub fn stand_ins(
-    points: &[SurfacePoint],
-    patches: &Patches,
-    mesh: &LightMesh,
-    reach: f64,
-) -> Vec<Option<u32>> {
-    let triangles: Vec<[u32; 3]> = mesh.faces.iter().map(|f| f.vertices).collect();
-    let normals: Vec<DVec3> = (0..mesh.faces.len()).into_par_iter().map(|f| mesh.normal(f)).collect();
-    let region = |f: usize| mesh.faces[f].region;
-    let island = |f: usize| patches.regions[region(f) as usize].island;
-    let regions = GroupedBvh::new(&mesh.positions, &triangles, region, patches.regions.len());
-    let islands = GroupedBvh::new(&mesh.positions, &triangles, island, patches.islands as usize);
-    points
-        .par_iter()
-        .map(|point| {
-            let own = patches.triangle_region[point.triangle as usize];
-            let place = &patches.regions[own as usize];
-            let alike = |f: u32| {
-                mesh.faces[f as usize].back == point.back
-                    && normals[f as usize].dot(point.normal) > LEAST_COSINE
+pub fn feature_points(patches: &Patches) -> Vec<SurfacePoint> {
+    let mut features = Features::default();
+    for triangle in 0..patches.triangles.len() {
+        let corners = patches.corners(triangle);
+        let Some(normal) = cross_of(corners).try_normalize() else { continue };
+        let vertices = patches.triangles[triangle];
+        for side in 0..3 {
+            let next = (side + 1) % 3;
+            let (from, to) = (vertices[side], vertices[next]);
+            let (mut corner, mut middle) = (Vec3::ZERO, Vec3::ZERO);
+            corner[side] = 1.0;
+            (middle[side], middle[next]) = (0.5, 0.5);
+            let bare = SurfacePoint {
+                position: corners[side],
+                normal,
+                triangle: triangle as u32,
+                barycentric: corner,
+                area: 0.0,
+                back: false,
             };
-            let kin = |f: u32| {
-                patches.regions[region(f as usize) as usize].primitive == place.primitive && alike(f)
-            };
-            let found = regions.closest(own, point.position, reach, alike);
-            found
-                .or_else(|| islands.closest(place.island, point.position, reach, kin))
-                .map(|near| near.triangle)
-        })
-        .collect()
-}
-
-/// Hands the points of each face on to the lights that it was divided into: the light that stands for each point is the
-/// nearest of its face. `lights` are in the order of their faces.
-#[must_use]
-pub fn hand_on(points: &[SurfacePoint], standing: &Standing, lights: &[Light]) -> Vec<Option<u32>> {
-    let mut light_of = vec![None; points.len()];
-    let numbers: Vec<u32> = (0..lights.len() as u32).collect();
-    let runs: Vec<&[u32]> =
-        numbers.chunk_by(|&a, &b| lights[a as usize].face == lights[b as usize].face).collect();
-    let nearest: Vec<Vec<(u32, u32)>> =
-        runs.par_iter().map(|run| nearest_of(points, standing, lights, run)).collect();
-    for (point, light) in nearest.into_iter().flatten() {
-        light_of[point as usize] = Some(light);
-    }
-    light_of
-}
-
-/// For each point of a face, the nearest of the face's lights.
-fn nearest_of(
-    points: &[SurfacePoint],
-    standing: &Standing,
-    lights: &[Light],
-    run: &[u32],
-) -> Vec<(u32, u32)> {
-    let Some(&first) = run.first() else { return Vec::new() };
-    let own = standing.of(lights[first as usize].face as usize);
-    if run.len() == 1 {
-        return own.iter().map(|&p| (p, first)).collect();
-    }
-    let origin = lights[first as usize].corners[0];
-    let corners = run.iter().flat_map(|&l| lights[l as usize].corners);
-    let local: Vec<Vec3> = corners.map(|p| (p - origin).as_vec3()).collect();
-    let triangles: Vec<[u32; 3]> = (0..run.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-    let bvh = Bvh::new(&local, &triangles);
-    let light_at = |p: &u32| {
-        let near = bvh.closest((points[*p as usize].position - origin).as_vec3(), f32::INFINITY, |_| true)?;
-        Some((*p, run[near.triangle as usize]))
-    };
-    own.iter().filter_map(light_at).collect()
-}
-
-/// The numbers of the points for which each face (or light) stands, as offsets and a list.
-#[derive(Clone, Debug, Default)]
-pub struct Standing {
-    starts: Vec<u32>,
-    points: Vec<u32>,
-}
-
-impl Standing {
-    /// Inverts [`stand_ins`] or [`hand_on`] for that many faces or lights.
-    #[must_use]
-    pub fn new(stand_ins: &[Option<u32>], faces: usize) -> Self {
-        let mut starts = vec![0u32; faces + 1];
-        for face in stand_ins.iter().flatten() {
-            starts[*face as usize + 1] += 1;
+            features.add(patches, (from, from), bare);
+            let position = (corners[side] + corners[next]) / 2.0;
+            let middle = SurfacePoint { position, barycentric: middle, ..bare };
+            features.add(patches, (from.min(to), from.max(to)), middle);
         }
-        for f in 0..faces {
-            starts[f + 1] += starts[f];
-        }
-        let mut next = starts.clone();
-        let mut points = vec![0; starts[faces] as usize];
-        for (point, face) in stand_ins.iter().enumerate() {
-            if let Some(face) = face {
-                let slot = &mut next[*face as usize];
-                points[*slot as usize] = point as u32;
-                *slot += 1;
+    }
+    features.points
+}
+
+/// Two planes count as one where the cosine between them is above this: a thousandth of a radian.
+const ONE_PLANE_COSINE: f64 = 1.0 - 5e-7;
+
+/// The points at vertices and edges so far.
+#[derive(Default)]
+struct Features {
+    points: Vec<SurfacePoint>,
+    /// By place (a vertex twice, or the two of an edge) and region: the last point there, and before it the others.
+    last: FxHashMap<((u32, u32), u32), u32>,
+    before: Vec<u32>,
+}
+
+impl Features {
+    fn add(&mut self, patches: &Patches, place: (u32, u32), point: SurfacePoint) {
+        let key = (place, patches.triangle_region[point.triangle as usize]);
+        let last = self.last.get(&key).copied().unwrap_or(u32::MAX);
+        let mut at = last;
+        while let Some(known) = self.points.get(at as usize) {
+            if known.normal.dot(point.normal) > ONE_PLANE_COSINE {
+                return;
             }
+            at = self.before[at as usize];
         }
-        Self { starts, points }
-    }
-
-    /// The points of a face, ascending.
-    #[must_use]
-    pub fn of(&self, face: usize) -> &[u32] {
-        &self.points[self.starts[face] as usize..self.starts[face + 1] as usize]
+        self.last.insert(key, self.points.len() as u32);
+        self.points.push(point);
+        self.before.push(last);
+        if patches.region(point.triangle as usize).two_sided {
+            self.before.push(u32::MAX);
+            self.points.push(SurfacePoint { normal: -point.normal, back: true, ..point });
+        }
     }
 }

@@ -9,9 +9,8 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use serde::Serialize;
 
-use crate::decimate::LightMesh;
+use crate::correspondence::Light;
 use crate::patches::Patches;
-use crate::refine::Light;
 use crate::scene::Scene;
 use crate::topology::cross_of;
 use crate::verify::Violation;
@@ -106,7 +105,6 @@ impl Tags {
 pub fn tag(
     scene: &Scene,
     patches: &Patches,
-    mesh: &LightMesh,
     lights: &[Light],
     violations: &[Violation],
 ) -> Tags {
@@ -118,7 +116,7 @@ pub fn tag(
     let last = scene.objects.iter().filter_map(|o| o.steering.tag).max().unwrap_or(0);
     let mut tags = Tags { lights: vec![0; lights.len()], last, ..Tags::default() };
     for (l, light) in lights.iter().enumerate() {
-        let region = &patches.regions[mesh.faces[light.face as usize].region as usize];
+        let region = &patches.regions[light.region as usize];
         let object = &scene.objects[scene.primitives[region.primitive as usize].object as usize];
         let reason = match object.steering.tag {
             Some(_) => TagReason::Authored,

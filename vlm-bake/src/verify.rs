@@ -1,25 +1,26 @@
-//! Stage 6: proves that no light lights the surface that it stands for, and that none comes out on another side of its object.
+//! Stage 7: proves that no light lights the surface for which it stands, and that none comes out on another side of its object.
+//! `docs/behind-the-geometry.md` has the definition in words.
 //!
 //! A light fails
-//! - where it lights one of the surface points for which it stands, or comes nearer to that than the clearance
-//!   ([`crate::clearance::self_lighting`]);
+//! - where it lights one of the surface points for which it stands ([`crate::correspondence`]), or comes nearer to that than
+//!   the clearance ([`crate::clearance::self_lighting`]);
+//! - where the straight way from one of these points through the solid to the nearest place of the light leads out into the
+//!   open on another side ([`crate::way_out`]), or would with a little more depth;
 //! - where a corner, the middle of an edge or its centre lies in front of another side of its own island
 //!   ([`IslandDistance`]): a side that faces more than 60 degrees away from the light. In front of its own side it may lie: there it
 //!   bridges a recess.
-//!
-//! A light that fails is first mended: it sinks along its own normal as deep as its points ask for and the island allows. What
-//! then still fails is tagged by the next stage.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3, Vec3A};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::clearance::{rise, self_lighting};
-use crate::decimate::LightMesh;
+use crate::bvh::nearest::closest_point;
+use crate::clearance::self_lighting;
+use crate::correspondence::{Light, Standing};
 use crate::patches::{Patches, Region};
-use crate::refine::Light;
 use crate::signed_distance::IslandDistance;
-use crate::surface::{Standing, SurfacePoint};
+use crate::surface::SurfacePoint;
+use crate::way_out::WayOut;
 
 /// A light comes out of its island when it lies less than this share of the clearance behind it: a mitred vertex at a sharp edge
 /// may be nearer to the edge than to either face.
@@ -41,6 +42,7 @@ pub struct Violation {
     pub place: DVec3,
     /// It comes out on another side of its object.
     pub pokes_out: bool,
+    pub dbg: [bool;3],
 }
 
 /// The result of the check, as the report shows it.
@@ -60,46 +62,27 @@ pub struct ClearanceReport {
 pub struct Evidence<'a> {
     /// The visible surface.
     pub patches: &'a Patches,
-    /// The faces of which the lights are parts.
-    pub mesh: &'a LightMesh,
     /// Points on the visible surface.
     pub points: &'a [SurfacePoint],
     /// Which of them each light stands for.
     pub standing: &'a Standing,
     /// Sides of the islands.
     pub distance: &'a IslandDistance<'a>,
+    /// Ways out of objects.
+    pub way_out: &'a WayOut,
     /// Required distance behind the surface, metres.
     pub clearance: f64,
 }
 
 impl<'a> Evidence<'a> {
     fn region(&self, light: &Light) -> &Region {
-        &self.patches.regions[self.mesh.faces[light.face as usize].region as usize]
+        &self.patches.regions[light.region as usize]
     }
 
-    fn own_points(&self, light: usize) -> impl Iterator<Item = &'a SurfacePoint> {
+    /// The surface points of a light.
+    pub fn own_points(&self, light: usize) -> impl Iterator<Item = &'a SurfacePoint> {
         self.standing.of(light).iter().map(|&p| &self.points[p as usize])
     }
-}
-
-/// Sinks the lights that fail by at most `deepest` metres along their own normals; a light that this does not clear stays
-/// where it was. Lights of two-sided surfaces stay too: nothing lies behind such a surface.
-pub fn sink(lights: &mut [Light], evidence: &Evidence, deepest: f64) {
-    lights.par_iter_mut().enumerate().for_each(|(l, light)| {
-        if evidence.region(light).two_sided || judge(l, light, evidence).is_none() {
-            return;
-        }
-        let normal = light.normal();
-        let depth = evidence
-            .own_points(l)
-            .filter(|point| self_lighting(&light.corners, normal, point, evidence.clearance) > 0.0)
-            .map(|point| (rise(&light.corners, point) + 1.1 * evidence.clearance) / point.normal.dot(normal))
-            .fold(0.0, f64::max);
-        let sunk = Light { corners: light.corners.map(|p| p - normal * depth), ..*light };
-        if depth > 0.0 && depth <= deepest && judge(l, &sunk, evidence).is_none() {
-            *light = sunk;
-        }
-    });
 }
 
 /// Every light that fails, ascending. Lights of two-sided surfaces fail where they light their own points.
@@ -109,11 +92,17 @@ pub fn verify(lights: &[Light], evidence: &Evidence) -> Vec<Violation> {
 }
 
 /// What is wrong with a light, if anything.
-fn judge(number: usize, light: &Light, evidence: &Evidence) -> Option<Violation> {
+#[must_use]
+pub fn judge(number: usize, light: &Light, evidence: &Evidence) -> Option<Violation> {
     let mut violation = lit_points(number, light, evidence);
-    let region = evidence.region(light);
-    if !region.two_sided {
-        poke(light, region.island, evidence, &mut violation);
+    if !evidence.region(light).two_sided {
+        violation.dbg[0] = violation.points > 0;
+        poke_between(number, light, evidence, &mut violation);
+        violation.dbg[1] = violation.pokes_out;
+        let b = violation.pokes_out; violation.pokes_out=false;
+        poke_beside(light, evidence, &mut violation);
+        violation.dbg[2] = violation.pokes_out;
+        violation.pokes_out |= b;
     }
     (violation.points > 0 || violation.pokes_out).then_some(violation)
 }
@@ -134,10 +123,42 @@ fn lit_points(number: usize, light: &Light, evidence: &Evidence) -> Violation {
     violation
 }
 
+/// Looks for surface between a light's points and the light.
+fn poke_between(number: usize, light: &Light, evidence: &Evidence, violation: &mut Violation) {
+    let normal = light.normal();
+    for point in evidence.own_points(number) {
+        let before = (point.position - light.corners[0]).dot(normal);
+        // A point behind its light lies in a recess that the light bridges.
+        if before <= 0.0 {
+            continue;
+        }
+        let corners = light.corners.map(|v| (v - point.position).as_vec3a());
+        let place = point.position + Vec3::from(closest_point(&corners, Vec3A::ZERO)).as_dvec3();
+        if leads_out(point, place, evidence) {
+            violation.pokes_out = true;
+            let depth = place.distance(point.position);
+            if depth > violation.depth {
+                (violation.depth, violation.place) = (depth, point.position);
+            }
+        }
+    }
+}
+
+/// True if the way from a surface point to a place behind it leads out on another side.
+fn leads_out(point: &SurfacePoint, place: DVec3, evidence: &Evidence) -> bool {
+    let least = evidence.way_out.least_length();
+    let start = point.position - point.normal * least;
+    let Some(direction) = (place - start).try_normalize() else { return false };
+    let end = place + direction * (POKE_SHARE * evidence.clearance);
+    let own = evidence.patches.triangle_source[point.triangle as usize];
+    evidence.way_out.leads_out(start, end, |triangle| triangle == own)
+}
+
 /// Looks for places of a light that lie in front of another side of its island.
-fn poke(light: &Light, island: u32, evidence: &Evidence, violation: &mut Violation) {
+fn poke_beside(light: &Light, evidence: &Evidence, violation: &mut Violation) {
     let [a, b, c] = light.corners;
     let (normal, room) = (light.normal(), POKE_SHARE * evidence.clearance);
+    let island = evidence.region(light).island;
     for place in [a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0] {
         let other_side =
             evidence.distance.at(place, island).filter(|n| n.normal.dot(normal) < OTHER_SIDE_COSINE);

@@ -3,6 +3,8 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use crate::tags::TriangleTags;
+
 /// All the Virtual Light Meshes of one glTF file, with the static grid over them.
 ///
 /// Every light (a triangle) has a number: its index into `triangles`, `albedo`, `emission` and `tags`. The lights of one
@@ -30,8 +32,14 @@ pub struct VlmAsset {
     pub sample_starts: Vec<u32>,
     /// Points on the visible surface that phase 1 lights.
     pub samples: Vec<Sample>,
-    /// Tags of visible primitives, `(mesh, primitive, tag)`, sorted, tag never 0.
+    /// Tags of visible primitives as wholes, `(mesh, primitive, tag)`, sorted, tag never 0.
     pub primitive_tags: Vec<(u32, u32, u32)>,
+    /// Tags of the visible primitives whose triangles differ, sorted by mesh and primitive; none of them is in
+    /// `primitive_tags`.
+    pub triangle_tags: Vec<TriangleTags>,
+    /// Tags of visible nodes as wholes, `(node, tag)`, sorted, tag never 0. They win over those of the node's primitives,
+    /// which other nodes may share. See [`VlmAsset::tag_of`].
+    pub node_tags: Vec<(u32, u32)>,
     /// The static grid of light lists, in world space, or `None` when the asset has none.
     pub grid: Option<Grid>,
 }

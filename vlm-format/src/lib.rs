@@ -13,6 +13,7 @@ mod codec;
 mod container;
 mod accessor;
 mod asset;
+mod tags;
 mod validate;
 mod nodes;
 mod digest;
@@ -29,6 +30,7 @@ pub use package::{Container, OutputFile, Target};
 pub use read::{read_vlm, read_vlm_unchecked};
 pub use save::{write_atomic, write_file};
 pub use strip::EXTENSION;
+pub use tags::TriangleTags;
 pub use validate::{MAX_ASPECT_RATIO, validate};
 pub use write::{strip_vlm, write_vlm};
 

@@ -4,12 +4,13 @@ use glam::Vec3;
 use serde_json::Value;
 
 use crate::asset::{Grid, Sample, Settings, Vlm, VlmAsset};
-use crate::check::{self, array, count, index};
+use crate::check::{self, array, index};
 use crate::container::GltfFile;
 use crate::digest::{self, Source};
 use crate::error::{Error, Issue, Stale};
 use crate::nodes;
 use crate::strip::EXTENSION;
+use crate::tags::{TriangleTags, elements};
 use crate::validate::validate_in;
 
 /// Reads the Virtual Light Meshes of a file; `None` if it has none.
@@ -59,13 +60,14 @@ fn refuse<T>(file: &GltfFile, stale: Vec<Stale>) -> Result<T, Error> {
     Err(Error::Stale { file: file.name().to_owned(), stale })
 }
 
-/// Nodes that refer to VLMs without the root object that would hold them.
+/// Nodes that refer to VLMs, or have tags, without the root object that would hold them.
 fn if_orphaned(file: &GltfFile) -> Option<Stale> {
     let nodes = array(file.json(), "/nodes");
     let node = nodes.iter().position(|node| own(node).is_some())?;
     let path = nodes::path(file, &nodes::parents(file), node);
-    let reason =
-        format!("`{path}` refers to a VLM, but another tool removed the root object of the extension");
+    let what =
+        if nodes.get(node).and_then(own)?.get("vlms").is_some() { "refers to" } else { "has a tag of" };
+    let reason = format!("`{path}` {what} a VLM, but another tool removed the root object of the extension");
     Some(Stale { vlm: String::from("asset"), reason })
 }
 
@@ -81,7 +83,17 @@ struct Reader<'a> {
     stale: Vec<Stale>,
 }
 
-impl Reader<'_> {
+/// An array of the extension.
+struct Place<'a> {
+    /// Accessor and digest; `None` where the array is absent.
+    json: Option<&'a Value>,
+    /// For messages.
+    name: String,
+    /// What is stale if the array was altered: `grid` or `asset`.
+    vlm: &'static str,
+}
+
+impl<'a> Reader<'a> {
     fn fail_if_stale(&mut self) -> Result<(), Error> {
         if self.stale.is_empty() { Ok(()) } else { refuse(self.file, std::mem::take(&mut self.stale)) }
     }
@@ -118,6 +130,8 @@ impl Reader<'_> {
                 .map(|((position, normal), reflectance)| Sample { position, normal, reflectance })
                 .collect(),
             primitive_tags: primitive_tags(self.file),
+            triangle_tags: self.triangle_tags(),
+            node_tags: node_tags(self.file),
             grid: self.extension.get("grid").map(|json| self.grid(json)),
         }
     }
@@ -136,39 +150,76 @@ impl Reader<'_> {
         }
     }
 
+    /// Tags of the primitives whose triangles differ, in the order of the file.
+    fn triangle_tags(&mut self) -> Vec<TriangleTags> {
+        let mut all = Vec::new();
+        // No array of ours overlaps another: else a small file could name a large accessor again and again.
+        let mut left = self.view_bytes() / size_of::<u32>();
+        for (mesh, primitive, json) in own_of_primitives(self.file) {
+            let Some(json) = json.get("triangleTags") else { continue };
+            let name = format!("meshes/{mesh}/primitives/{primitive}/triangleTags");
+            let claimed = index(json, "accessor").map_or(0, |accessor| elements(self.file.json(), accessor));
+            let Some(rest) = left.checked_sub(claimed) else {
+                self.outdated(
+                    "asset",
+                    format!("another tool altered the file: `{name}` claims more than there is"),
+                );
+                break;
+            };
+            left = rest;
+            let tags = self.integers_at(&Place { json: Some(json), name, vlm: "asset" });
+            all.push(TriangleTags { mesh, primitive, tags });
+        }
+        all
+    }
+
+    /// Size of the buffer view that holds all arrays.
+    fn view_bytes(&self) -> usize {
+        let view = self.extension.get("data").and_then(|data| index(data, "bufferView"));
+        let view = view.and_then(|view| array(self.file.json(), "/bufferViews").get(view));
+        view.and_then(|view| index(view, "byteLength")).unwrap_or(0)
+    }
+
+    fn place(&self, group: &str, key: &str) -> Place<'a> {
+        Place {
+            json: self.extension.get(group).and_then(|group| group.get(key)),
+            name: format!("{group}/{key}"),
+            vlm: if group == "grid" { "grid" } else { "asset" },
+        }
+    }
+
     fn vectors(&mut self, group: &str, key: &str) -> Vec<Vec3> {
         let read = |file: &GltfFile, accessor| {
             let values = file.read_vec3(accessor)?;
             let bytes = values.iter().flat_map(|value| value.to_array()).flat_map(f32::to_le_bytes).collect();
             Ok((values, bytes))
         };
-        self.elements(group, key, "VEC3", read)
+        self.elements(&self.place(group, key), "VEC3", read)
     }
 
     fn integers(&mut self, group: &str, key: &str) -> Vec<u32> {
+        self.integers_at(&self.place(group, key))
+    }
+
+    fn integers_at(&mut self, place: &Place<'_>) -> Vec<u32> {
         let read = |file: &GltfFile, accessor| {
             let values = file.read_u32(accessor)?;
             let bytes = values.iter().copied().flat_map(u32::to_le_bytes).collect();
             Ok((values, bytes))
         };
-        self.elements(group, key, "SCALAR", read)
+        self.elements(place, "SCALAR", read)
     }
 
     /// Reads an array; absent ones are empty. One that cannot be read, or has another digest, is stale.
     fn elements<T>(
         &mut self,
-        group: &str,
-        key: &str,
+        place: &Place<'_>,
         kind: &str,
         read: impl Fn(&GltfFile, usize) -> Result<(Vec<T>, Vec<u8>), Error>,
     ) -> Vec<T> {
-        let Some(json) = self.extension.get(group).and_then(|group| group.get(key)) else {
-            return Vec::new();
-        };
+        let Place { json: Some(json), name, vlm } = place else { return Vec::new() };
         let accessor = index(json, "accessor").unwrap_or(usize::MAX);
-        let vlm = if group == "grid" { "grid" } else { "asset" };
-        let altered =
-            format!("accessor {accessor} `{group}/{key}` was renumbered or altered by another tool");
+        let altered = format!("accessor {accessor} `{name}` was renumbered or altered by another tool");
         match read(self.file, accessor) {
             Ok((_, bytes))
                 if self.trust == Trust::Verify
@@ -256,17 +307,26 @@ fn vlm(json: &Value) -> Vlm {
     }
 }
 
-/// Tags of visible primitives, in the order of the file.
+/// Tags of visible primitives as wholes, in the order of the file.
 fn primitive_tags(file: &GltfFile) -> Vec<(u32, u32, u32)> {
-    let mut tags = Vec::new();
-    for (m, mesh) in array(file.json(), "/meshes").iter().enumerate() {
-        for (p, primitive) in array(mesh, "/primitives").iter().enumerate() {
-            let tag =
-                own(primitive).and_then(|own| count(own, "tag")).and_then(|tag| u32::try_from(tag).ok());
-            if let Some(tag) = tag.filter(|&tag| tag != 0) {
-                tags.push((m as u32, p as u32, tag));
-            }
-        }
-    }
-    tags
+    own_of_primitives(file).filter_map(|(mesh, primitive, own)| Some((mesh, primitive, tag(own)?))).collect()
+}
+
+/// Tags of nodes, in the order of the file.
+fn node_tags(file: &GltfFile) -> Vec<(u32, u32)> {
+    let nodes = array(file.json(), "/nodes").iter().enumerate();
+    nodes.filter_map(|(node, json)| Some((node as u32, tag(own(json)?)?))).collect()
+}
+
+/// The tag of a node or primitive as a whole.
+fn tag(own: &Value) -> Option<u32> {
+    own.get("tag")?.as_u64().and_then(|tag| u32::try_from(tag).ok())
+}
+
+/// The extension's objects in primitives, with mesh and primitive.
+fn own_of_primitives(file: &GltfFile) -> impl Iterator<Item = (u32, u32, &Value)> {
+    array(file.json(), "/meshes").iter().enumerate().flat_map(|(m, mesh)| {
+        let primitives = array(mesh, "/primitives").iter().enumerate();
+        primitives.filter_map(move |(p, primitive)| Some((m as u32, p as u32, own(primitive)?)))
+    })
 }

@@ -33,8 +33,8 @@ pub fn write_vlm(file: &GltfFile, asset: &VlmAsset, target: &Target) -> Result<V
     parts.convert(file, target);
     let mut extension = Arrays::new(&parts.json).extension(asset);
     add_digests(&mut extension.json, file, asset)?;
+    refer(&mut parts.json, asset, std::mem::take(&mut extension.triangle_tags));
     extension.append_to(&mut parts, target);
-    refer(&mut parts.json, asset);
     parts.pack(target)
 }
 
@@ -61,6 +61,8 @@ struct Arrays {
 /// The root object, and the data that it refers to.
 struct Extension {
     json: Map<String, Value>,
+    /// The objects of the primitives whose triangles have tags, in the order of the asset.
+    triangle_tags: Vec<Value>,
     arrays: Arrays,
 }
 
@@ -84,7 +86,8 @@ impl Arrays {
         if let Some(grid) = &asset.grid {
             json.insert(String::from("grid"), self.grid(grid));
         }
-        Extension { json, arrays: self }
+        let triangle_tags = asset.triangle_tags.iter().map(|entry| self.triangle_tags(&entry.tags)).collect();
+        Extension { json, triangle_tags, arrays: self }
     }
 
     fn lights(&mut self, asset: &VlmAsset) -> Value {
@@ -115,6 +118,12 @@ impl Arrays {
         self.integers(&mut json, "cells", &grid.cells);
         self.integers(&mut json, "starts", &grid.starts);
         self.integers(&mut json, "entries", &grid.entries);
+        Value::Object(json)
+    }
+
+    fn triangle_tags(&mut self, tags: &[u32]) -> Value {
+        let mut json = Map::new();
+        self.integers(&mut json, "triangleTags", tags);
         Value::Object(json)
     }
 
@@ -258,20 +267,27 @@ fn add_buffer(parts: &mut Parts, bytes: Vec<u8>, target: &Target) -> Place {
     Place { buffer, offset: 0, length_before: 0 }
 }
 
-/// Marks the nodes that bear lights and the primitives that are tagged.
-fn refer(json: &mut Value, asset: &VlmAsset) {
-    let mut ids: BTreeMap<u32, Vec<&str>> = BTreeMap::new();
+/// Marks the nodes that bear lights, and the nodes and primitives that are tagged.
+fn refer(json: &mut Value, asset: &VlmAsset, triangle_tags: Vec<Value>) {
+    let mut nodes: BTreeMap<u32, Map<String, Value>> = BTreeMap::new();
     for vlm in &asset.vlms {
-        ids.entry(vlm.node).or_default().push(&vlm.id);
+        push_in(nodes.entry(vlm.node).or_default(), "vlms", json!(vlm.id));
     }
-    for (node, ids) in ids {
+    for (node, tag) in &asset.node_tags {
+        nodes.entry(*node).or_default().insert(String::from("tag"), json!(tag));
+    }
+    for (node, extension) in nodes {
         if let Some(node) = json.pointer_mut(&format!("/nodes/{node}")) {
-            insert_extension(node, json!({ "vlms": ids }));
+            insert_extension(node, Value::Object(extension));
         }
     }
-    for (mesh, primitive, tag) in &asset.primitive_tags {
+    let whole =
+        asset.primitive_tags.iter().map(|&(mesh, primitive, tag)| (mesh, primitive, json!({ "tag": tag })));
+    let places = asset.triangle_tags.iter().map(|entry| (entry.mesh, entry.primitive));
+    let parts = places.zip(triangle_tags).map(|((mesh, primitive), tags)| (mesh, primitive, tags));
+    for (mesh, primitive, extension) in whole.chain(parts) {
         if let Some(primitive) = json.pointer_mut(&format!("/meshes/{mesh}/primitives/{primitive}")) {
-            insert_extension(primitive, json!({ "tag": tag }));
+            insert_extension(primitive, extension);
         }
     }
 }
@@ -285,9 +301,13 @@ fn insert_extension(item: &mut Value, extension: Value) {
 }
 
 fn push(json: &mut Value, key: &str, item: Value) {
-    if let Value::Object(object) = json
-        && let Value::Array(list) = object.entry(key).or_insert_with(|| json!([]))
-    {
+    if let Value::Object(object) = json {
+        push_in(object, key, item);
+    }
+}
+
+fn push_in(object: &mut Map<String, Value>, key: &str, item: Value) {
+    if let Value::Array(list) = object.entry(key).or_insert_with(|| json!([])) {
         list.push(item);
     }
 }

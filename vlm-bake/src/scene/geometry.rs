@@ -106,13 +106,13 @@ pub(super) fn place(
     file: &str,
 ) -> Result<usize, Error> {
     let world = world_positions(local, placement, file)?;
-    let mut triangles = local.triangles.clone();
+    let kept = |(_, triangle): &(u32, &[u32; 3])| has_area(triangle.map(|v| corner(&world, v)));
+    let (in_primitive, mut triangles): (Vec<u32>, Vec<[u32; 3]>) =
+        (0..).zip(&local.triangles).filter(kept).map(|(number, &triangle)| (number, triangle)).unzip();
+    let degenerate = local.triangles.len() - triangles.len();
     if placement.mirrored {
         triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
     }
-    let all = triangles.len();
-    triangles.retain(|triangle| has_area(triangle.map(|v| corner(&world, v))));
-    let degenerate = all - triangles.len();
 
     // Flat shading: no vertex is shared, so that each takes its triangle's normal.
     let source: Vec<u32> = match local.normals {
@@ -126,6 +126,7 @@ pub(super) fn place(
     if scene.positions.len() + source.len() > MAX_VERTICES {
         return Err(Error::TooLarge { file: file.to_owned(), limit: MAX_VERTICES });
     }
+    scene.triangle_in_primitive.extend(in_primitive);
     push(scene, local, &world, &source, &triangles, placement);
     Ok(degenerate)
 }
@@ -164,6 +165,7 @@ fn push(
         primitive: placement.primitive,
         material: placement.material,
         triangles: [first_triangle, triangles.len() as u32],
+        drawn_triangles: local.triangles.len() as u32,
     });
     let positions = scene.positions.get(first_vertex as usize..).unwrap_or_default();
     let normals = world_normals(local, placement, source, positions, triangles);

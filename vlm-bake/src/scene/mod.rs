@@ -22,6 +22,8 @@ pub struct Scene {
     pub triangles: Vec<[u32; 3]>,
     /// Index into `primitives` for each triangle.
     pub triangle_primitive: Vec<u32>,
+    /// For each triangle its index within the glTF primitive as drawn, where those that are left out count, too.
+    pub triangle_in_primitive: Vec<u32>,
     /// One per glTF primitive and node (and instance).
     pub primitives: Vec<ScenePrimitive>,
     /// One per node that has visible or authored geometry.
@@ -55,6 +57,8 @@ pub struct ScenePrimitive {
     pub material: u32,
     /// First triangle and number of triangles.
     pub triangles: [u32; 2],
+    /// Triangles that the glTF primitive draws, those that are left out counted.
+    pub drawn_triangles: u32,
 }
 
 /// A node with geometry.

@@ -1,6 +1,9 @@
 //! `vlm check`, `vlm inspect` and `vlm strip`.
 
+use std::path::Path;
+
 use serde_json::{Value, json};
+use vlm_format::{GltfFile, Target, TriangleTags, VlmAsset, write_atomic, write_vlm};
 
 use crate::support::{Document, Folders, repository, run, text};
 
@@ -91,6 +94,31 @@ fn inspect_counts() {
     assert_eq!(content["grid"]["stored_cells"], json!(grid.cells.len()));
     let lines = run(["inspect", &baked]);
     assert!(text(&lines.stdout).contains("vlm       room (node 0)"), "{}", text(&lines.stdout));
+}
+
+#[test]
+fn inspect_counts_tags() {
+    let folders = Folders::new();
+    let baked = baked_room(&folders);
+    let file = GltfFile::open(Path::new(&baked)).unwrap();
+    let drawn = file.triangle_count(0, 0).unwrap();
+    let tags = (0..drawn as u32).map(|triangle| triangle % 3).collect();
+    let asset = VlmAsset {
+        primitive_tags: Vec::new(),
+        triangle_tags: vec![TriangleTags { mesh: 0, primitive: 0, tags }],
+        node_tags: vec![(0, 5)],
+        ..crate::support::read(&baked)
+    };
+    let outputs = write_vlm(&file, &asset, &Target::from_path(Path::new(&baked)).unwrap()).unwrap();
+    write_atomic(&outputs, Path::new(&baked).parent().unwrap()).unwrap();
+
+    let content = json_of(&run(["inspect", &baked, "--json"]));
+    assert_eq!((drawn, &content["tagged_triangles"]), (12, &json!(8)));
+    assert_eq!((&content["partly_tagged_primitives"], &content["tagged_primitives"]), (&json!(1), &json!(0)));
+    assert_eq!(content["tagged_nodes"], json!(1));
+    let lines = run(["inspect", &baked]);
+    let expected = "tagged 1 nodes, 0 primitives, 8 triangles of 1 more primitives";
+    assert!(text(&lines.stdout).contains(expected), "{}", text(&lines.stdout));
 }
 
 #[test]

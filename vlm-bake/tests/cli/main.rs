@@ -8,3 +8,4 @@ mod baking;
 mod authored;
 mod commands;
 mod report_html;
+mod geometry;

@@ -1,6 +1,8 @@
 //! The shape of `VLM_virtual_light_mesh`, as tables.
 
-use super::shape::Shape::{self, Bool, Count, List, Number, Numbers, Object, Objects, Small, Text, Texts};
+use super::shape::Shape::{
+    self, Bool, Count, Number, Numbers, Object, Objects, OneField, Small, SomeOf, Tag, Text, Texts,
+};
 use super::shape::{Field, may, must};
 use super::tables::{ACCESSOR, VIEW};
 
@@ -9,15 +11,18 @@ const NAME: &str = "VLM_virtual_light_mesh";
 /// The extension's objects in the root, in nodes and in primitives; nothing else of the file.
 pub(super) const EXTENSION: &[Field] = &[
     may("extensions", Object(&[may(NAME, Object(ROOT))])),
-    may("nodes", List(&Object(&[may("extensions", Object(&[may(NAME, Object(&[must("vlms", Texts)]))]))]))),
+    may("nodes", Objects(&[may("extensions", Object(&[may(NAME, NODE)]))])),
     may(
         "meshes",
-        Objects(&[must(
-            "primitives",
-            List(&Object(&[may("extensions", Object(&[may(NAME, Object(&[must("tag", Count)]))]))])),
-        )]),
+        Objects(&[must("primitives", Objects(&[may("extensions", Object(&[may(NAME, PRIMITIVE)]))]))]),
     ),
 ];
+
+/// A node that bears VLMs, has a tag, or both.
+const NODE: Shape = SomeOf(&[may("vlms", Texts), may("tag", Tag)]);
+
+/// A primitive that is tagged as a whole or by triangle.
+const PRIMITIVE: Shape = OneField(&[may("tag", Tag), may("triangleTags", ARRAY)]);
 
 /// One array of the extension.
 const ARRAY: Shape = Object(&[must("accessor", ACCESSOR), must("digest", Text)]);

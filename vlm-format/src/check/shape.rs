@@ -14,6 +14,8 @@ pub(super) enum Shape {
     Number,
     /// A whole number, 0 or more.
     Count,
+    /// A whole number of 32 bits, above 0.
+    Tag,
     /// Exactly so many finite numbers; 0 for any number of them.
     Numbers(usize),
     /// Exactly so many whole numbers of 32 bits.
@@ -29,6 +31,10 @@ pub(super) enum Shape {
     /// A list of texts.
     Texts,
     Object(&'static [Field]),
+    /// An object with at least one of these properties.
+    SomeOf(&'static [Field]),
+    /// An object with exactly one of these properties.
+    OneField(&'static [Field]),
     Objects(&'static [Field]),
     /// An object whose values all have this shape.
     Map(&'static Shape),
@@ -53,8 +59,8 @@ pub(super) const fn may(name: &'static str, shape: Shape) -> Field {
 }
 
 use Shape::{
-    Bool, Count, Index, Indices, List, Map as MapOf, Number, Numbers, Object, Objects, OneOf, Small, Text,
-    Texts, Word,
+    Bool, Count, Index, Indices, List, Map as MapOf, Number, Numbers, Object, Objects, OneField, OneOf,
+    Small, SomeOf, Tag, Text, Texts, Word,
 };
 
 /// Compares a value, the whole file, with a table. Indices must lead into its own arrays.
@@ -77,10 +83,16 @@ impl Walk<'_, '_> {
             Text => self.expect(value.is_string(), value, "a text"),
             Number => self.number(value),
             Count => self.expect(value.is_u64(), value, "a whole number, 0 or more"),
+            Tag => {
+                let fits = value.as_u64().is_some_and(|tag| tag > 0 && u32::try_from(tag).is_ok());
+                self.expect(fits, value, "a tag: a whole number of 32 bits, above 0");
+            }
             Index(array) => self.index(value, array),
             OneOf(allowed) => self.one_of(value, allowed),
             Word(allowed) => self.word(value, allowed),
             Object(fields) => self.object(value, fields),
+            SomeOf(fields) => self.choice(value, fields, fields.len()),
+            OneField(fields) => self.choice(value, fields, 1),
             MapOf(shape) => self.map(value, *shape),
             List(shape) => self.list(value, *shape),
             Objects(fields) => self.list(value, Object(fields)),
@@ -108,6 +120,21 @@ impl Walk<'_, '_> {
                 None if field.required => self.wrong(Code::Missing, format!("`{}` is missing", field.name)),
                 None => {}
             }
+        }
+    }
+
+    /// An object that has some of the properties, at most so many.
+    fn choice(&mut self, value: &Value, fields: &[Field], most: usize) {
+        self.object(value, fields);
+        let present = fields.iter().filter(|field| value.get(field.name).is_some()).count();
+        if value.is_object() && !(1..=most).contains(&present) {
+            let names: Vec<String> = fields.iter().map(|field| format!("`{}`", field.name)).collect();
+            let (code, says) = if present == 0 {
+                (Code::Missing, "is missing")
+            } else {
+                (Code::WrongValue, "may stand alone only")
+            };
+            self.wrong(code, format!("{} {says}", names.join(" or ")));
         }
     }
 

@@ -36,8 +36,14 @@ struct Content {
     samples: usize,
     /// Distinct tags of lights.
     tags: BTreeSet<u32>,
-    /// Visible primitives that carry a tag.
+    /// Visible primitives that carry a tag as wholes.
     tagged_primitives: usize,
+    /// Triangles with a tag of their own.
+    tagged_triangles: usize,
+    /// Primitives to which those triangles belong.
+    partly_tagged_primitives: usize,
+    /// Visible nodes that carry a tag as wholes.
+    tagged_nodes: usize,
     grid: Option<GridContent>,
 }
 
@@ -92,6 +98,14 @@ impl Content {
             samples: asset.samples.len(),
             tags: tags.collect(),
             tagged_primitives: asset.primitive_tags.len(),
+            tagged_triangles: asset
+                .triangle_tags
+                .iter()
+                .flat_map(|t| &t.tags)
+                .filter(|&&tag| tag != 0)
+                .count(),
+            partly_tagged_primitives: asset.triangle_tags.len(),
+            tagged_nodes: asset.node_tags.len(),
             grid: asset.grid.as_ref().map(GridContent::of),
         }
     }
@@ -106,9 +120,12 @@ impl Content {
                 self.lights, self.emitting_lights, self.tagged_lights, self.vertices, self.samples
             ),
             format!(
-                "tags      {} of lights, {} visible primitives tagged",
+                "tags      {} of lights; tagged {} nodes, {} primitives, {} triangles of {} more primitives",
                 self.tags.len(),
-                self.tagged_primitives
+                self.tagged_nodes,
+                self.tagged_primitives,
+                self.tagged_triangles,
+                self.partly_tagged_primitives
             ),
         ];
         lines.push(self.grid.as_ref().map_or_else(|| "grid      none".to_owned(), GridContent::line));

@@ -85,6 +85,55 @@ fn triangles_without_area_are_left_out_with_a_note() {
 }
 
 #[test]
+fn triangles_keep_their_number_as_drawn() {
+    // 1---3---5   As a list: three of the strip's triangles, and between them one without area. As a strip: the doubled
+    // | \ | \ |   corner 2 gives two triangles without area. As a fan round 0: one, for the doubled corner 3.
+    // 0---2---4
+    let ladder = [0.0, 1.0, 2.0].map(|x| [[x, 0.0, 0.0], [x, 1.0, 0.0]]).concat();
+    let cases: [(u32, &[u16], &[u32], u32); 4] = [
+        (4, &[0, 2, 1, 1, 2, 2, 1, 2, 3, 2, 4, 3], &[0, 2, 3], 4),
+        (5, &[0, 2, 2, 1, 3, 4], &[2, 3], 4),
+        (5, &[0, 2, 1, 3], &[0, 1], 2),
+        (6, &[0, 2, 3, 3, 1], &[0, 2], 3),
+    ];
+    for (mode, corners, numbers, drawn) in cases {
+        for mirrored in [false, true] {
+            let mut builder = Builder::new(&ladder);
+            let indices = builder.indices(corners);
+            builder.primitive()["indices"] = indices;
+            builder.primitive()["mode"] = json!(mode);
+            builder.json["nodes"] = json!([{ "mesh": 0 }, { "mesh": 0, "translation": [0, 0, 1] }]);
+            builder.json["scenes"][0]["nodes"] = json!([0, 1]);
+            if mirrored {
+                builder.node()["scale"] = json!([-1, 1, 1]);
+            }
+            let scene = builder.load().unwrap();
+            assert_eq!(scene.triangle_in_primitive, [numbers, numbers].concat(), "mode {mode}");
+            assert!(
+                scene.primitives.iter().all(|primitive| primitive.drawn_triangles == drawn),
+                "mode {mode}"
+            );
+            // The number leads back to the corners, in whatever order the winding takes them.
+            for (t, &number) in scene.triangle_in_primitive.iter().enumerate() {
+                let at = |i: u32| ladder[corners[i as usize] as usize];
+                let file = match mode {
+                    4 => [at(3 * number), at(3 * number + 1), at(3 * number + 2)],
+                    5 => [at(number), at(number + 1), at(number + 2)],
+                    _ => [at(0), at(number + 1), at(number + 2)],
+                };
+                let x_sign = if mirrored && t < numbers.len() { -1.0 } else { 1.0 };
+                let flat = |[x, y]: [f32; 2]| (x as i32, y as i32);
+                let mut expected = file.map(|[x, y, _]| flat([x * x_sign, y]));
+                let mut found = scene.corners(t).unwrap().map(|p| flat([p.x, p.y]));
+                expected.sort_unstable();
+                found.sort_unstable();
+                assert_eq!(found, expected, "mode {mode}, triangle {number}");
+            }
+        }
+    }
+}
+
+#[test]
 fn vertices_beyond_single_precision_are_refused_with_their_place() {
     let mut builder = Builder::new(&CORNERS);
     builder.json["nodes"] =

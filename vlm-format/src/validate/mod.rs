@@ -1,5 +1,7 @@
 //! The invariants of a [`VlmAsset`], checked before it is written and after it is read.
 
+mod tags;
+
 use std::collections::HashSet;
 
 use glam::{DVec3, Vec3};
@@ -30,7 +32,7 @@ pub fn validate(asset: &VlmAsset) -> Vec<Issue> {
         vlms(asset, &mut issues);
         lights(asset, &mut issues);
         samples(asset, &mut issues);
-        primitive_tags(asset, &mut issues);
+        tags::tags(asset, &mut issues);
         settings(asset, &mut issues);
         if let Some(grid) = &asset.grid {
             check_grid(grid, asset.triangles.len(), &mut issues);
@@ -39,32 +41,23 @@ pub fn validate(asset: &VlmAsset) -> Vec<Issue> {
     issues.0
 }
 
-/// The rules of [`validate`], and those that concern the file around the asset: nodes and primitives exist, and lights are
-/// well shaped in world space, where their form factors are computed.
+/// The rules of [`validate`], and those that concern the file around the asset: nodes and primitives exist, every triangle of
+/// a primitive has its tag, and lights are well shaped in world space, where their form factors are computed.
 pub(crate) fn validate_in(file: &GltfFile, asset: &VlmAsset) -> Vec<Issue> {
     let mut issues = Issues(validate(asset));
     if issues.0.is_empty() {
-        references(file, asset, &mut issues);
+        bearers(file, asset, &mut issues);
+        tags::in_file(file, asset, &mut issues);
         aspect_ratios(file, asset, &mut issues);
     }
     issues.0
 }
 
-fn references(file: &GltfFile, asset: &VlmAsset, issues: &mut Issues) {
-    let (nodes, meshes) = (array(file.json(), "/nodes"), array(file.json(), "/meshes"));
+fn bearers(file: &GltfFile, asset: &VlmAsset, issues: &mut Issues) {
+    let nodes = array(file.json(), "/nodes").len();
     issues.check_all(&asset.vlms, Code::VlmNode, "/vlms", "there is no such node", |vlm| {
-        (vlm.node as usize) < nodes.len()
+        (vlm.node as usize) < nodes
     });
-    issues.check_all(
-        &asset.primitive_tags,
-        Code::VlmNode,
-        "/primitive_tags",
-        "there is no such primitive",
-        |&(mesh, primitive, _)| {
-            let mesh = meshes.get(mesh as usize);
-            mesh.is_some_and(|mesh| (primitive as usize) < array(mesh, "/primitives").len())
-        },
-    );
 }
 
 fn aspect_ratios(file: &GltfFile, asset: &VlmAsset, issues: &mut Issues) {
@@ -208,16 +201,6 @@ fn check_starts(starts: &[u32], length: usize, pointer: &str, issues: &mut Issue
     });
 }
 
-fn primitive_tags(asset: &VlmAsset, issues: &mut Issues) {
-    let ascending = asset.primitive_tags.is_sorted_by(|a, b| (a.0, a.1) < (b.0, b.1));
-    issues.check(ascending, Code::VlmOrder, "/primitive_tags", || {
-        String::from("not sorted, or a primitive occurs twice")
-    });
-    issues.check_all(&asset.primitive_tags, Code::VlmNumber, "/primitive_tags", "the tag is 0", |entry| {
-        entry.2 != 0
-    });
-}
-
 fn settings(asset: &VlmAsset, issues: &mut Issues) {
     let settings = &asset.settings;
     let finite = settings.cell_size.is_finite() && settings.range.is_finite();
@@ -265,6 +248,7 @@ fn check_grid(grid: &Grid, lights: usize, issues: &mut Issues) {
 mod tests {
     use super::*;
     use crate::asset::{Sample, Vlm};
+    use crate::tags::TriangleTags;
 
     /// Two lights of one node, one sample each, in a grid of one cell.
     fn valid() -> VlmAsset {
@@ -292,6 +276,11 @@ mod tests {
             }),
             ..VlmAsset::default()
         }
+    }
+
+    /// Of a primitive with two triangles, the second tagged.
+    fn triangles(mesh: u32, tag: u32) -> TriangleTags {
+        TriangleTags { mesh, primitive: 0, tags: vec![0, tag] }
     }
 
     fn grid(asset: &mut VlmAsset) -> &mut Grid {
@@ -329,6 +318,18 @@ mod tests {
             (Code::VlmOrder, "/sample_starts", |a| a.sample_starts = vec![0, 2, 1]),
             (Code::VlmOrder, "/primitive_tags", |a| a.primitive_tags = vec![(0, 1, 1), (0, 0, 1)]),
             (Code::VlmNumber, "/primitive_tags/0", |a| a.primitive_tags = vec![(0, 0, 0)]),
+            (Code::VlmOrder, "/triangle_tags", |a| a.triangle_tags = vec![triangles(1, 1), triangles(0, 1)]),
+            (Code::VlmOrder, "/triangle_tags", |a| a.triangle_tags = vec![triangles(1, 1), triangles(1, 2)]),
+            (Code::VlmNumber, "/triangle_tags/1", |a| {
+                a.triangle_tags = vec![triangles(0, 1), triangles(1, 0)];
+            }),
+            (Code::VlmNumber, "/triangle_tags/0", |a| a.triangle_tags = vec![TriangleTags::default()]),
+            (Code::VlmOrder, "/triangle_tags/0", |a| {
+                (a.primitive_tags, a.triangle_tags) = (vec![(0, 0, 1), (1, 0, 1)], vec![triangles(1, 1)]);
+            }),
+            (Code::VlmOrder, "/node_tags", |a| a.node_tags = vec![(2, 1), (1, 1)]),
+            (Code::VlmOrder, "/node_tags", |a| a.node_tags = vec![(2, 1), (2, 3)]),
+            (Code::VlmNumber, "/node_tags/1", |a| a.node_tags = vec![(1, 1), (2, 0)]),
             (Code::VlmNumber, "/settings", |a| a.settings.range = f32::NAN),
             (Code::VlmNumber, "/grid", |a| grid(a).cell_size = 0.0),
             (Code::VlmRange, "/grid/dimensions", |a| grid(a).dimensions = [1 << 16, 1 << 15, 1]),
