@@ -13,7 +13,7 @@ use crate::options::BakeOptions;
 use crate::samples::{BakedLight, WorldSample};
 use crate::scene::{AuthoredMesh, AuthoredMode, Scene, Volume};
 use crate::surface::{SurfacePoint, spread_over};
-use crate::tag::Tags;
+use crate::tag::{Accused, TagReason};
 use crate::topology::{barycentric, cross_of};
 
 /// An authored light stands for surface within this share of the scene's extent. Higher values let a mesh float farther
@@ -23,11 +23,12 @@ const REACH_SHARE: f32 = 0.05;
 /// It stands only for surface that faces its way by this cosine.
 const LEAST_COSINE: f32 = 0.3;
 
-/// What the check of the authored lights found.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct AuthoredCheck {
-    /// Surface points checked.
-    pub samples: u64,
+/// A light that an artist made, and what it would light wrongly.
+pub struct Made {
+    /// The light.
+    pub light: BakedLight,
+    /// The light with the surface that it lights though it stands for that.
+    pub accused: Option<Accused>,
 }
 
 fn adds(mesh: &AuthoredMesh) -> bool {
@@ -44,32 +45,24 @@ pub fn count(scene: &Scene) -> usize {
     scene.authored.iter().filter(|m| adds(m)).map(|m| m.triangles.len()).sum()
 }
 
+/// The lights that artists made.
+#[must_use]
+pub fn made(scene: &Scene, options: &BakeOptions, clearance: f64) -> Vec<Made> {
+    let adding: Vec<&AuthoredMesh> = scene.authored.iter().filter(|m| adds(m)).collect();
+    if adding.is_empty() {
+        return Vec::new();
+    }
+    let visible = VisibleSurface::new(scene);
+    let lights = |mesh| AuthoredLights { scene, mesh, visible: &visible, options, clearance }.lights();
+    adding.into_iter().flat_map(lights).collect()
+}
+
 /// Takes away the derived lights that authored meshes replace or subtract, and adds those that artists made.
-pub fn merge(
-    scene: &Scene,
-    lights: &mut Vec<BakedLight>,
-    tags: &mut Tags,
-    options: &BakeOptions,
-    clearance: f64,
-) -> AuthoredCheck {
-    let mut check = AuthoredCheck::default();
+pub fn merge(scene: &Scene, lights: &mut Vec<BakedLight>, made: impl IntoIterator<Item = BakedLight>) {
     for mesh in scene.authored.iter().filter(|m| subtracts(m)) {
         subtract(mesh, lights);
     }
-    let adding: Vec<&AuthoredMesh> = scene.authored.iter().filter(|m| adds(m)).collect();
-    if adding.is_empty() {
-        return check;
-    }
-    let visible = VisibleSurface::new(scene);
-    for mesh in adding {
-        let stage = AuthoredLights { scene, mesh, visible: &visible, options, clearance };
-        for (light, failing) in stage.lights() {
-            check.samples += u64::from(options.tests_per_light);
-            let tag = failing.map(|primitive| tags.add_uncleared(scene, primitive, light.corners));
-            lights.push(BakedLight { tag: tag.unwrap_or(light.tag), ..light });
-        }
-    }
-    check
+    lights.extend(made);
 }
 
 /// Removes the derived lights whose centres lie inside an authored mesh.
@@ -119,19 +112,19 @@ struct AuthoredLights<'a> {
 }
 
 impl AuthoredLights<'_> {
-    /// Every light, and the scene primitive that it lights though it stands for it.
-    fn lights(&self) -> Vec<(BakedLight, Option<u32>)> {
+    fn lights(&self) -> Vec<Made> {
         (0..self.mesh.triangles.len()).into_par_iter().filter_map(|t| self.light(t)).collect()
     }
 
-    fn light(&self, triangle: usize) -> Option<(BakedLight, Option<u32>)> {
+    fn light(&self, triangle: usize) -> Option<Made> {
         let corners = self.mesh.triangles[triangle].map(|v| self.mesh.positions[v as usize].as_dvec3());
         let normal = cross_of(corners).try_normalize()?;
         let steering = &self.scene.objects[self.mesh.object as usize].steering;
         let own = self.surface_behind(corners, normal);
-        let failing =
-            own.iter().find(|(point, _)| self_lighting(&corners, normal, point, self.clearance) > 0.0);
-        let failing = failing.map(|(point, _)| self.scene.triangle_primitive[point.triangle as usize]);
+        let lit = own.iter().filter(|(p, _)| self_lighting(&corners, normal, p, self.clearance) > 0.0);
+        let mut triangles: Vec<u32> = lit.map(|(point, _)| point.triangle).collect();
+        triangles.sort_unstable();
+        triangles.dedup();
         let strength = steering.tint * steering.intensity;
         let painted = self.mesh.albedo.as_ref().map(|albedo| albedo[triangle]);
         let mean = || own.iter().map(|(_, albedo)| *albedo).sum::<Vec3>() / own.len().max(1) as f32;
@@ -144,7 +137,10 @@ impl AuthoredLights<'_> {
             authored: true,
             samples: self.samples(&own, painted, strength),
         };
-        Some((light, failing.filter(|_| steering.tag.is_none())))
+        let area_m2 = 0.5 * cross_of(corners).length();
+        let accused =
+            Accused { object: self.mesh.object, area_m2, triangles, reason: TagReason::Uncleared };
+        Some(Made { light, accused: Some(accused).filter(|a| !a.triangles.is_empty()) })
     }
 
     /// Points of the visible surface for which the light stands, with their albedo.

@@ -3,15 +3,17 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3A};
+use rayon::prelude::*;
 use vlm_format::{Grid, VlmAsset};
 
 use crate::authored;
-use crate::clearance::required_clearance;
+use crate::bvh::nearest::closest_point;
 use crate::correspondence::{Correspondence, Light, Standing};
 use crate::decimate::{Decimation, LightMesh, decimate};
 use crate::grid::grid;
-use crate::mend::mend;
+use crate::ground::Ground;
+use crate::mend::{Hidden, mend};
 use crate::offset::Surroundings;
 use crate::options::BakeOptions;
 use crate::patches::{Patches, patches};
@@ -20,27 +22,17 @@ use crate::refine::{Refiner, Snap};
 use crate::report::{AreaReport, DecimationReport, GridReport, OffsetReport, Report};
 use crate::samples::{BakedLight, Sources, samples};
 use crate::scene::Scene;
-use crate::signed_distance::IslandDistance;
 use crate::slivers::MAX_ASPECT;
-use crate::surface::{SurfacePoint, feature_points, spread_points};
-use crate::tag::{Tags, tag};
+use crate::surface::SurfacePoint;
+use crate::tag::{Accused, TagReason, Tags, tag};
 use crate::topology::aspect_ratio;
-use crate::verify::{ClearanceReport, Evidence, Violation, verify};
-use crate::way_out::WayOut;
-use crate::write::{assemble, order, placeable};
-
-/// A face stands for surface at most this share of the scene's extent away, on top of four times the decimation's error.
-const REACH_SHARE: f64 = 0.02;
+use crate::verify::check;
+use crate::verify::judge::{judge, Evidence, Violation, verify};
+use crate::write::{as_stored, assemble, order, placeable};
 
 /// Lights sink by at most this many times the clearance and the mean distance between faces and their surface together. Higher values
 /// hide more lights behind bumpy surface instead of tagging them, and put all of them deeper there, where they fit their surface less.
-const DEEPEST: f64 = 4.0;
-
-/// The least number of surface points by which lights are placed: small budgets are as fine as medium ones.
-const LEAST_POINTS: usize = 20_000;
-
-/// The least number of area-uniform points of the final check.
-const LEAST_CHECK_POINTS: usize = 200_000;
+const DEEPEST: f64 = 12.0;
 
 /// An asset and how it came about.
 #[derive(Clone, Debug, Default)]
@@ -87,127 +79,141 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     }
 
     clock.stage("decimate");
-    #[allow(clippy::clone_on_copy)]
     let (mesh, decimation) = decimate(&patches, options);
 
     clock.stage("mend");
-    let clearance = required_clearance(scene.bounds().unwrap_or_default());
-    let reach = reach(scene, &decimation);
-    let points = spread_points(&patches, point_count(options));
-    let points = check_points(&patches, points, options);
-    let distance = IslandDistance::new(&patches);
-    let way_out = WayOut::new(scene, &patches);
+    let ground = Ground::new(scene, &patches);
     let coarse = mesh.lights();
-    let light_of_point = Correspondence::new(&patches, &coarse, reach, |_| true).of(&points);
-    let deepest = std::env::var("DEEP").ok().and_then(|d| d.parse().ok()).unwrap_or(DEEPEST) * (clearance + mean_distance(&points, &light_of_point, &coarse));
-    let around =
-        Surroundings { patches: &patches, points: &points, clearance, reach, deepest, way_out: &way_out };
+    let points = ground.points(options.lights as usize);
+    let light_of_point = Correspondence::new(&ground, &coarse, |_| true).of(&points);
+    let distance = measured_distance(&points, &light_of_point, &coarse);
+    let deepest = DEEPEST * (ground.clearance + distance.mean_m);
+    let around = Surroundings { ground: &ground, points: &points, deepest };
     let snap = Snap::new(&patches);
     let density = densities(scene, &patches, &mesh, &Standing::new(&light_of_point, coarse.len()));
     let budget = (options.lights as usize).saturating_sub(authored::count(scene));
-    let hidden = mend(Refiner::new(mesh, density, &snap), budget, &around, &distance);
-    let lights = hidden.lights;
+    let hidden = mend(Refiner::new(mesh, density, &snap), budget, &around);
 
     clock.stage("verify");
-    let light_of_point = Correspondence::new(&patches, &lights, reach, |_| true).of(&points);
+    let hidden = kept(scene, &ground, &points, hidden);
+    let lights = &hidden.lights;
+    let light_of_point = Correspondence::new(&ground, lights, |_| true).of(&points);
     let standing = Standing::new(&light_of_point, lights.len());
-    let evidence = Evidence {
-        patches: &patches,
-        points: &points,
-        standing: &standing,
-        distance: &distance,
-        way_out: &way_out,
-        clearance,
-    };
-    let violations = verify(&lights, &evidence);
-    if std::env::var("DBG").is_ok() {
-        eprintln!("regions {} islands {} triangles {} decimation {decimation:?} mean distance {:.4}", patches.regions.len(), patches.islands, patches.triangles.len(), mean_distance(&points, &light_of_point, &lights));
-        let total: f64 = lights.iter().map(Light::area).sum();
-        let mut by: BTreeMap<[bool; 3], (u32, f64, Vec<f64>)> = BTreeMap::new();
-        for v in &violations {
-            let e = by.entry(v.dbg).or_default();
-            e.0 += 1; e.1 += lights[v.light as usize].area()/total*100.0; e.2.push(v.depth/clearance);
-        }
-        for (k, (n, a, mut d)) in by { d.sort_by(f64::total_cmp); eprintln!("lit,between,beside={k:?} n={n} area={a:.2}% depth/c p10 {:.2} p50 {:.2} p90 {:.2}; deepest/c {:.1}", d[d.len()/10], d[d.len()/2], d[d.len()*9/10], deepest/clearance); }
-        for v in violations.iter().take(3) { let l=&lights[v.light as usize]; eprintln!("{v:?}\n   {:?} n {:?} aspect {:.1} len/c {:.1}", l.corners, l.normal(), aspect_ratio(l.corners), l.corners[0].distance(l.corners[1])/clearance); }
-    }
+    let evidence = Evidence { ground: &ground, points: &points, standing: &standing };
+    let violations = verify(lights, &evidence);
 
     clock.stage("tag");
-    let mut tags = tag(scene, &patches, &lights, &violations);
-    let clearance_report = remaining(scene, &evidence, &lights, &violations, &tags);
+    let made = authored::made(scene, options, ground.clearance);
+    let tags = tags(scene, &patches, lights, violations, &made);
 
     clock.stage("samples");
-    let light_tags = tags.lights.clone();
     let sources = Sources {
         scene,
         patches: &patches,
         group: &hidden.coarse,
-        tags: &light_tags,
+        tags: &tags.lights,
         points: &points,
         standing: &standing,
     };
-    let offset = offset_report(&lights, &hidden.depths);
-    let mut lights = samples(&sources, &lights, options.samples);
-
-    clock.stage("authored");
-    let authored_check = authored::merge(scene, &mut lights, &mut tags, options, clearance);
+    let derived = lights.len();
+    let mut baked = samples(&sources, lights, options.samples);
+    let made = made.into_iter().zip(&tags.lights[derived..]);
+    authored::merge(scene, &mut baked, made.map(|(made, &tag)| BakedLight { tag, ..made.light }));
 
     clock.stage("grid");
-    let authored_before = authored_lights(&lights);
-    lights.retain(|light| placeable(scene, light));
-    let authored_dropped = authored_before - authored_lights(&lights);
-    order(&mut lights);
-    if lights.is_empty() {
+    let authored_before = authored_lights(&baked);
+    baked.retain(|light| placeable(scene, light));
+    let authored_dropped = authored_before - authored_lights(&baked);
+    order(&mut baked);
+    if baked.is_empty() {
         return Err(BakeError::NothingLeft { asked: options.lights });
     }
-    let corners: Vec<[DVec3; 3]> = lights.iter().map(|l| l.corners).collect();
+    let corners: Vec<[DVec3; 3]> = baked.iter().map(|l| l.corners).collect();
     let grid = grid(scene, &corners, options.cell_size, options.range);
 
     clock.stage("assemble");
+    let grid_report = grid_report(grid.as_ref());
+    let asset = assemble(scene, &baked, &tags, grid, options);
+
+    clock.stage("prove");
+    let proof = check(scene, &asset, &ground);
+    if std::env::var("DBG").is_ok() {
+        for f in proof.untagged().take(12) {
+            let b = &baked[f.light as usize];
+            let found = lights.iter().position(|l| l.corners.iter().zip(b.corners).all(|(a, b)| a.distance(b) < 1e-9));
+            let v = found.and_then(|l| judge(l, &lights[l], &evidence));
+            let reg = found.map(|l| lights[l].region);
+            eprintln!("{f:?}\n  tag {} found {found:?} region {reg:?} violation {v:?} samples {}", b.tag, b.samples.len());
+        }
+    }
     let mut report = Report {
         visible_triangles: scene.triangles.len(),
         asked_lights: options.lights,
-        decimation: decimation.into(),
-        offset,
-        clearance: ClearanceReport {
-            samples: points.len() as u64 + authored_check.samples,
-            required_m: clearance,
-            ..clearance_report
-        },
-        tags: tags.report(),
-        area: area_report(&points, &light_of_point, &lights),
-        grid: grid_report(grid.as_ref()),
+        lights: asset.triangles.len(),
+        authored_lights: authored_lights(&baked),
+        samples: asset.samples.len(),
+        decimation: decimation_report(&decimation, distance),
+        offset: offset_report(lights, &hidden.depths),
+        clearance: proof.report(),
+        area: area_report(&points, &light_of_point, &baked, &tags),
+        tags: tags.reports,
+        grid: grid_report,
         notes: notes(scene, authored_dropped),
         ..Report::default()
     };
-    let asset = assemble(scene, &lights, &tags, grid, options);
-    report.lights = asset.triangles.len();
-    report.authored_lights = authored_lights(&lights);
-    report.samples = asset.samples.len();
     report.missed_because = why_missed(&report, options);
     report.seconds = clock.finish();
     Ok(Bake { asset, report })
 }
 
-/// The violations that no tag mends: a receiver ignores a light of its own tag.
-fn remaining(
-    scene: &Scene,
-    evidence: &Evidence,
-    lights: &[Light],
-    violations: &[Violation],
-    tags: &Tags,
-) -> ClearanceReport {
-    let mut report = ClearanceReport::default();
-    for violation in violations {
-        let region = lights[violation.light as usize].region;
-        let primitive = evidence.patches.regions[region as usize].primitive;
-        let tag = tags.lights[violation.light as usize];
-        if tag == 0 || tag != tags.of_primitive(scene, primitive) {
-            report.violations += u64::from(violation.points) + u64::from(violation.pokes_out);
-            report.worst_m = report.worst_m.max(violation.depth);
-        }
+/// The lights as the file will hold them, rounded to single precision in the space of their node, without those that would be too thin
+/// or stand for no surface.
+fn kept(scene: &Scene, ground: &Ground, points: &[SurfacePoint], hidden: Hidden) -> Hidden {
+    let Hidden { mut lights, coarse, depths } = hidden;
+    lights.par_iter_mut().for_each(|light| {
+        let primitive = ground.patches.regions[light.region as usize].primitive;
+        let object = &scene.objects[scene.primitives[primitive as usize].object as usize];
+        light.corners = as_stored(object.world_from_node, light.corners);
+    });
+    let shaped: Vec<bool> = lights.iter().map(|l| aspect_ratio(l.corners) <= MAX_ASPECT).collect();
+    let light_of_point = Correspondence::new(ground, &lights, |l| shaped[l]).of(points);
+    let standing = Standing::new(&light_of_point, lights.len());
+    let keep = |l: usize| shaped[l] && !standing.of(l).is_empty();
+    let chosen: Vec<usize> = (0..lights.len()).filter(|&l| keep(l)).collect();
+    Hidden {
+        lights: chosen.iter().map(|&l| lights[l]).collect(),
+        coarse: chosen.iter().map(|&l| coarse[l]).collect(),
+        depths: chosen.iter().map(|&l| depths[l]).collect(),
     }
-    report
+}
+
+/// Tags for whatever fails, of derived and authored lights, in this order.
+fn tags(
+    scene: &Scene,
+    patches: &Patches,
+    lights: &[Light],
+    violations: Vec<Violation>,
+    made: &[authored::Made],
+) -> Tags {
+    let region = |light: &Light| patches.regions[light.region as usize];
+    let object = |light: &Light| scene.primitives[region(light).primitive as usize].object;
+    let mut objects: Vec<u32> = lights.iter().map(object).collect();
+    let mut accused: Vec<Option<Accused>> = vec![None; lights.len()];
+    for violation in violations {
+        let light = &lights[violation.light as usize];
+        let reason = match (region(light).two_sided, violation.pokes_out) {
+            (true, _) => TagReason::TwoSided,
+            (false, true) => TagReason::Thin,
+            (false, false) => TagReason::Uncleared,
+        };
+        let source = |&t: &u32| patches.triangle_source[t as usize];
+        let triangles = violation.triangles.iter().map(source).collect();
+        accused[violation.light as usize] =
+            Some(Accused { object: object(light), area_m2: light.area(), triangles, reason });
+    }
+    objects.extend(made.iter().map(|made| made.light.object));
+    accused.extend(made.iter().map(|made| made.accused.clone()));
+    tag(scene, &objects, &accused)
 }
 
 fn authored_lights(lights: &[BakedLight]) -> usize {
@@ -224,36 +230,22 @@ fn notes(scene: &Scene, authored_dropped: usize) -> Vec<String> {
     notes
 }
 
-/// The points of the final check: those of the mending or more, and every vertex and edge.
-fn check_points(patches: &Patches, points: Vec<SurfacePoint>, options: &BakeOptions) -> Vec<SurfacePoint> {
-    let count = point_count(options).max(LEAST_CHECK_POINTS);
-    let mut points = if count > point_count(options) { spread_points(patches, count) } else { points };
-    points.extend(feature_points(patches));
-    points
-}
-
-fn point_count(options: &BakeOptions) -> usize {
-    (options.lights as usize * options.tests_per_light as usize).max(LEAST_POINTS)
-}
-
-/// How far from the surface the face that stands for it may lie, metres.
-fn reach(scene: &Scene, decimation: &Decimation) -> f64 {
-    let extent = scene.bounds().map_or(0.0, |[low, high]| (high - low).max_element());
-    REACH_SHARE * extent + 4.0 * decimation.error_m
-}
-
-/// The mean distance of points from the planes of the lights that stand for them, metres.
-fn mean_distance(points: &[SurfacePoint], light_of_point: &[Option<u32>], lights: &[Light]) -> f64 {
-    let distance = |(point, light): (&SurfacePoint, &Option<u32>)| {
-        let light = &lights[(*light)? as usize];
-        Some((point.position - light.corners[0]).dot(light.normal()).abs())
+/// The distances of points from the faces that stand for them.
+fn measured_distance(points: &[SurfacePoint], light_of_point: &[Option<u32>], faces: &[Light]) -> Distance {
+    let distance = |(point, face): (&SurfacePoint, &Option<u32>)| {
+        let corners = faces[(*face)? as usize].corners.map(|v| (v - point.position).as_vec3a());
+        Some((point.area, f64::from(closest_point(&corners, Vec3A::ZERO).length())))
     };
-    let (sum, count) = points
-        .iter()
-        .zip(light_of_point)
-        .filter_map(distance)
-        .fold((0.0, 0.0), |(sum, n), d| (sum + d, n + 1.0));
-    if count > 0.0 { sum / count } else { 0.0 }
+    let mut all: Vec<(f64, f64)> = points.iter().zip(light_of_point).filter_map(distance).collect();
+    all.sort_unstable_by(|a, b| a.1.total_cmp(&b.1));
+    let area: f64 = all.iter().map(|(area, _)| area).sum();
+    let mean_m = all.iter().map(|(area, d)| area * d).sum::<f64>() / area.max(f64::MIN_POSITIVE);
+    let mut below = 0.0;
+    let p99 = all.iter().find(|(area_of, _)| {
+        below += area_of;
+        below >= 0.99 * area
+    });
+    Distance { mean_m, p99_m: p99.map_or(0.0, |(_, d)| *d) }
 }
 
 /// The artist's density per face; 0 where a face stands for nothing, or where the offset made it too thin to be a light.
@@ -267,10 +259,16 @@ fn densities(scene: &Scene, patches: &Patches, mesh: &LightMesh, standing: &Stan
     mesh.faces.iter().enumerate().map(density).collect()
 }
 
-impl From<Decimation> for DecimationReport {
-    fn from(decimation: Decimation) -> Self {
-        Self { asked: decimation.asked, reached: decimation.reached, error_m: decimation.error_m }
-    }
+/// How far decimated faces lie from their surface.
+#[derive(Clone, Copy)]
+struct Distance {
+    mean_m: f64,
+    p99_m: f64,
+}
+
+fn decimation_report(decimation: &Decimation, distance: Distance) -> DecimationReport {
+    let Decimation { asked, reached, error_m } = *decimation;
+    DecimationReport { asked, reached, error_m, mean_m: distance.mean_m, p99_m: distance.p99_m }
 }
 
 /// The mean is weighted by area: small lights are many, and count little.
@@ -283,7 +281,12 @@ fn offset_report(lights: &[Light], depths: &[f64]) -> OffsetReport {
     }
 }
 
-fn area_report(points: &[SurfacePoint], light_of_point: &[Option<u32>], lights: &[BakedLight]) -> AreaReport {
+fn area_report(
+    points: &[SurfacePoint],
+    light_of_point: &[Option<u32>],
+    lights: &[BakedLight],
+    tags: &Tags,
+) -> AreaReport {
     let of = |l: &BakedLight| 0.5 * crate::topology::cross_of(l.corners).length();
     let uncovered = points.iter().zip(light_of_point).filter(|(_, light)| light.is_none());
     AreaReport {
@@ -291,6 +294,7 @@ fn area_report(points: &[SurfacePoint], light_of_point: &[Option<u32>], lights: 
         uncovered_m2: uncovered.map(|(p, _)| p.area).sum(),
         lights_m2: lights.iter().map(of).sum(),
         tagged_m2: lights.iter().filter(|l| l.tag != 0).map(of).sum(),
+        covered_by_tags_m2: tags.reports.iter().map(|r| r.covers_m2).sum(),
     }
 }
 

@@ -1,13 +1,14 @@
 //! Which light stands for which point of the visible surface.
 //!
 //! Decimation keeps, for each face, the *region* that it came from (connected, of one primitive and one albedo), and so do the
-//! lights. A point belongs to the nearest light of its own region and side that looks its way. Where decimation left none of the
-//! region, the next of the same primitive and connected surface takes over. A point that finds neither within reach is not
-//! covered: no light stands for it.
+//! lights. A point belongs to the light of its own region and side that looks its way and lies straight behind it, before it
+//! where it bridges a recess, or else nearest. A light stands for no point farther away than its own longest edge. A point that finds
+//! none is not covered: no light stands for it.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
+use crate::ground::Ground;
 use crate::grouped_bvh::GroupedBvh;
 use crate::patches::Patches;
 use crate::surface::SurfacePoint;
@@ -16,11 +17,11 @@ use crate::topology::cross_of;
 /// A light stands only for points whose normal is at most this far (cosine) from its own. Lower values let a light stand
 /// for the side walls of what was decimated away, which it can never clear; higher values leave more of the surface without
 /// a light.
-const LEAST_COSINE: f64 = 0.8;
+const LEAST_COSINE: f64 = 0.9;
 
-/// The search for the light of a vertex or edge starts this share of the way to the middle of the triangle. Higher values
-/// leave the last bit of the surface to its neighbour; lower values find a neighbour's light across the edge.
-const INNER_SHARE: f64 = 0.1;
+/// The light straight behind a point counts where it is at most this many times as far away as the nearest. Higher values find
+/// the far side of a hollow; lower values give the surface beside a sharp edge to the light across it.
+const STRAIGHT_SHARE: f64 = 3.0;
 
 /// A triangle that emits, and what it came from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,6 +41,12 @@ impl Light {
         0.5 * cross_of(self.corners).length()
     }
 
+    /// Length of the longest edge, metres.
+    #[must_use]
+    pub fn longest_edge(&self) -> f64 {
+        (0..3).map(|i| self.corners[i].distance(self.corners[(i + 1) % 3])).fold(0.0, f64::max)
+    }
+
     /// Unit normal on the emitting side; zero without area.
     #[must_use]
     pub fn normal(&self) -> DVec3 {
@@ -52,30 +59,28 @@ pub struct Correspondence<'a> {
     patches: &'a Patches,
     sides: Vec<bool>,
     normals: Vec<DVec3>,
-    primitives: Vec<u32>,
+    /// Longest edges.
+    sizes: Vec<f64>,
     regions: GroupedBvh,
-    islands: GroupedBvh,
     reach: f64,
 }
 
 impl<'a> Correspondence<'a> {
-    /// Prepares the search among `lights`, each standing for surface at most `reach` metres away. Those for which `emits` is
-    /// false stand for nothing.
+    /// Prepares the search among `lights`. Those for which `emits` is false stand for nothing.
     #[must_use]
-    pub fn new(patches: &'a Patches, lights: &[Light], reach: f64, emits: impl Fn(usize) -> bool) -> Self {
+    pub fn new(ground: &Ground<'a>, lights: &[Light], emits: impl Fn(usize) -> bool) -> Self {
+        let patches = ground.patches;
         let positions: Vec<DVec3> = lights.iter().flat_map(|light| light.corners).collect();
         let triangles: Vec<[u32; 3]> =
             (0..lights.len() as u32).map(|l| [3 * l, 3 * l + 1, 3 * l + 2]).collect();
         let region = |l: usize| if emits(l) { lights[l].region } else { patches.regions.len() as u32 };
-        let island = |l: usize| patches.regions.get(region(l) as usize).map_or(patches.islands, |r| r.island);
         Self {
             patches,
             sides: lights.iter().map(|light| light.back).collect(),
             normals: lights.iter().map(Light::normal).collect(),
-            primitives: lights.iter().map(|l| patches.regions[l.region as usize].primitive).collect(),
+            sizes: lights.iter().map(Light::longest_edge).collect(),
             regions: GroupedBvh::new(&positions, &triangles, region, patches.regions.len() + 1),
-            islands: GroupedBvh::new(&positions, &triangles, island, patches.islands as usize + 1),
-            reach,
+            reach: ground.reach,
         }
     }
 
@@ -83,32 +88,19 @@ impl<'a> Correspondence<'a> {
     #[must_use]
     pub fn light_of(&self, point: &SurfacePoint) -> Option<u32> {
         let own = self.patches.triangle_region[point.triangle as usize];
-        let position = self.inner(point);
-        let place = &self.patches.regions[own as usize];
+        let position = point.inner(self.patches);
         let alike = |l: u32| {
             self.sides[l as usize] == point.back && self.normals[l as usize].dot(point.normal) > LEAST_COSINE
         };
-        let kin = |l: u32| self.primitives[l as usize] == place.primitive && alike(l);
+        let near = self.regions.closest(own, position, self.reach, alike)?;
+        if f64::from(near.distance) > self.sizes[near.triangle as usize] {
+            return None;
+        }
+        let far = STRAIGHT_SHARE * f64::from(near.distance);
         let along = |direction: DVec3| {
-            self.regions.hit(own, position, direction, self.reach, alike).map(|(light, _)| light)
+            self.regions.hit(own, position, direction, far, alike).map(|(light, _)| light)
         };
-        along(-point.normal)
-            .or_else(|| along(point.normal))
-            .or_else(|| {
-                self.regions.closest(own, position, self.reach, alike).map(|near| near.triangle)
-            })
-            .or_else(|| {
-                self.islands
-                    .closest(place.island, position, self.reach, kin)
-                    .map(|near| near.triangle)
-            })
-    }
-
-    /// Where the search for a point starts: a little inside its triangle, since at a vertex or edge surfaces meet that
-    /// have lights of their own.
-    fn inner(&self, point: &SurfacePoint) -> DVec3 {
-        let centre = self.patches.corners(point.triangle as usize).iter().sum::<DVec3>() / 3.0;
-        if point.area > 0.0 { point.position } else { point.position.lerp(centre, INNER_SHARE) }
+        along(-point.normal).or_else(|| along(point.normal)).or(Some(near.triangle))
     }
 
     /// The light of each point.

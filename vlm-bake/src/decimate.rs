@@ -15,6 +15,13 @@ use crate::planar::merge_coplanar;
 use crate::slivers::remove_slivers;
 use crate::topology::cross_of;
 
+/// Decimation takes more faces than its share of the budget rather than exceed this error (a share of the extent): lights on a
+/// surface that is no longer there come out of thin objects. Higher values keep more of the budget for dividing large lights.
+const COSTLY_ERROR: f32 = 2e-3;
+
+/// The share of the budget that decimation may take then.
+const MOST_SHARE: f64 = 0.85;
+
 /// A triangle mesh between decimation and the final lights, in world space.
 #[derive(Clone, Debug, Default)]
 pub struct LightMesh {
@@ -83,11 +90,12 @@ pub struct Decimation {
 #[must_use]
 pub fn decimate(patches: &Patches, options: &BakeOptions) -> (LightMesh, Decimation) {
     let asked = (f64::from(options.lights) * options.surface_share) as usize;
+    let most = (f64::from(options.lights) * MOST_SHARE) as usize;
     let input = SimplifierInput::new(patches);
     let doubled = patches.triangles.len()
         + (0..patches.triangles.len()).filter(|&t| patches.region(t).two_sided).count();
-    let fronts = asked * patches.triangles.len() / doubled.max(1);
-    let (indices, error_m) = input.simplify(fronts, options.free_error as f32);
+    let fronts = |faces: usize| faces * patches.triangles.len() / doubled.max(1);
+    let (indices, error_m) = input.simplify(fronts(asked), fronts(most), options.free_error as f32);
     let mut mesh = merge_coplanar(input.mesh(patches, &indices));
     remove_slivers(&mut mesh);
     add_backs(&mut mesh, patches);
@@ -133,9 +141,9 @@ impl SimplifierInput {
         input
     }
 
-    /// Indices of about `target` triangles, or fewer where that costs no more than `free_error` (a share of the extent);
-    /// with the error in metres.
-    fn simplify(&self, target: usize, free_error: f32) -> (Vec<u32>, f64) {
+    /// Indices of about `target` triangles: fewer where that costs no more than `free_error` (a share of the extent), more where
+    /// fewer would cost more than [`COSTLY_ERROR`], but at most `most` if topology allows; with the error in metres.
+    fn simplify(&self, target: usize, most: usize, free_error: f32) -> (Vec<u32>, f64) {
         if self.indices.is_empty() {
             return (Vec::new(), 0.0);
         }
@@ -148,15 +156,21 @@ impl SimplifierInput {
             (shorter, error)
         };
         let (mut indices, mut error) = run(&self.indices, 0, free_error, SimplifyOptions::RegularizeLight);
-        if indices.len() > target * 3 {
-            let (shorter, further) = run(&indices, target, f32::MAX, SimplifyOptions::RegularizeLight);
-            (indices, error) = (shorter, error.max(further));
+        let pruning = SimplifyOptions::RegularizeLight | SimplifyOptions::Prune;
+        for (target, limit, options) in [
+            (target, COSTLY_ERROR, pruning),
+            (most, 8.0 * COSTLY_ERROR, pruning),
+            (most, f32::MAX, SimplifyOptions::RegularizeLight),
+        ] {
+            if indices.len() > target * 3 {
+                let (shorter, further) = run(&indices, target, limit, options);
+                (indices, error) = (shorter, error.max(further));
+            }
         }
-        // Only a budget that the topology does not allow removes islands, and only while enough of the surface stays.
-        if indices.len() > target * 3 + target / 8 {
-            let options = SimplifyOptions::RegularizeLight | SimplifyOptions::Prune;
-            let (shorter, further) = run(&indices, target, f32::MAX, options);
-            if 2 * shorter.len() > target * 3 {
+        // Only a budget that the topology does not allow removes large islands, and only while enough of the surface stays.
+        if indices.len() > most * 3 + most / 8 {
+            let (shorter, further) = run(&indices, most, f32::MAX, pruning);
+            if 2 * shorter.len() > most * 3 {
                 (indices, error) = (shorter, error.max(further));
             }
         }

@@ -19,6 +19,7 @@ pub mod correspondence;
 pub mod clearance;
 pub mod signed_distance;
 pub mod way_out;
+pub mod ground;
 pub mod refine;
 pub mod offset;
 pub mod mend;

@@ -12,19 +12,28 @@ use crate::correspondence::{Correspondence, Light, Standing};
 use crate::decimate::LightMesh;
 use crate::offset::{Surroundings, offset};
 use crate::refine::Refiner;
-use crate::signed_distance::IslandDistance;
 use crate::slivers::MAX_ASPECT;
+use crate::surface::SurfacePoint;
 use crate::topology::aspect_ratio;
-use crate::verify::{Evidence, Violation, judge, verify};
+use crate::verify::judge::{Evidence, Violation, judge, verify};
 
 /// Share of the budget that is kept for lights that fail. Higher values leave fewer of them, and larger lights everywhere else.
-const MENDING_SHARE: f64 = 0.15;
+const MENDING_SHARE: f64 = 0.2;
 
 /// Rounds of cutting lights that fail.
-const ROUNDS: usize = 4;
+const ROUNDS: usize = 5;
+
+/// Points per light by which failing lights are found while there is budget to cut them. Higher values find more of them, slowly.
+const ROUGH_POINTS_PER_LIGHT: usize = 20;
+
+/// The least number of these points.
+const LEAST_ROUGH_POINTS: usize = 20_000;
 
 /// The sizes to which a light may shrink, largest first. Below half, the rest of its surface would be lit from too small a place.
 const SIZES: [f64; 4] = [1.0, 0.85, 0.7, 0.5];
+
+/// A light sinks by itself by at most this share of its longer edges, for the reason that vertices move by no more.
+const SINK_SHARE: f64 = 0.4;
 
 /// A shrunk light lies this many times the required clearance behind its surface, so that rounding does not fail it.
 const MARGIN: f64 = 1.05;
@@ -41,16 +50,23 @@ pub struct Hidden {
 
 /// Refines to the budget and hides the lights.
 #[must_use]
-pub fn mend(mut refiner: Refiner, budget: usize, around: &Surroundings, distance: &IslandDistance) -> Hidden {
+pub fn mend(mut refiner: Refiner, budget: usize, around: &Surroundings) -> Hidden {
     refiner.to_budget((budget as f64 * (1.0 - MENDING_SHARE)) as usize);
+    let fewer = thinned(around.points, budget);
+    let roughly = Surroundings { points: &fewer, ..*around };
     for _ in 0..ROUNDS {
         let room = budget.saturating_sub(refiner.lights());
         if room == 0 {
             break;
         }
-        let (mesh, emits) = in_place(&refiner, around);
+        let (mesh, emits) = in_place(&refiner, &roughly);
         let lights = mesh.lights();
-        let failing = look(&lights, &emits, around, distance, curable);
+        let failing = look(&lights, &emits, &roughly, |lights, evidence| {
+            for f in (0..lights.len()).filter(|&f| evidence.own_points(f).next().is_none()) {
+                refiner.density[f] = 0.0;
+            }
+            curable(lights, evidence)
+        });
         if failing.is_empty() {
             break;
         }
@@ -59,7 +75,7 @@ pub fn mend(mut refiner: Refiner, budget: usize, around: &Surroundings, distance
     refiner.to_budget(budget);
     let (mesh, emits) = in_place(&refiner, around);
     let mut lights = mesh.lights();
-    let mended = look(&lights, &emits, around, distance, |lights, evidence| {
+    let mended = look(&lights, &emits, around, |lights, evidence| {
         let failing = curable(lights, evidence);
         let mended = |v: &Violation| Some((v.light, shrunk(v.light, lights, evidence, around.deepest)?));
         failing.par_iter().filter_map(mended).collect::<Vec<_>>()
@@ -68,6 +84,12 @@ pub fn mend(mut refiner: Refiner, budget: usize, around: &Surroundings, distance
         lights[l as usize] = light;
     }
     collect(&refiner, lights, &emits)
+}
+
+/// Every n-th point, enough of them to see which lights fail badly.
+fn thinned(points: &[SurfacePoint], budget: usize) -> Vec<SurfacePoint> {
+    let enough = (ROUGH_POINTS_PER_LIGHT * budget).max(LEAST_ROUGH_POINTS);
+    points.iter().step_by(points.len().div_ceil(enough).max(1)).copied().collect()
 }
 
 /// The mesh with its vertices where they hide best, and which faces make lights there.
@@ -85,19 +107,11 @@ fn look<T>(
     lights: &[Light],
     emits: &[bool],
     around: &Surroundings,
-    distance: &IslandDistance,
-    what: impl Fn(&[Light], &Evidence) -> T,
+    what: impl FnOnce(&[Light], &Evidence) -> T,
 ) -> T {
-    let correspondence = Correspondence::new(around.patches, lights, around.reach, |l| emits[l]);
+    let correspondence = Correspondence::new(around.ground, lights, |l| emits[l]);
     let standing = Standing::new(&correspondence.of(around.points), lights.len());
-    let evidence = Evidence {
-        patches: around.patches,
-        points: around.points,
-        standing: &standing,
-        distance,
-        way_out: around.way_out,
-        clearance: around.clearance,
-    };
+    let evidence = Evidence { ground: around.ground, points: around.points, standing: &standing };
     what(lights, &evidence)
 }
 
@@ -105,7 +119,7 @@ fn look<T>(
 fn curable(lights: &[Light], evidence: &Evidence) -> Vec<Violation> {
     let mut failing = verify(lights, evidence);
     let one_sided =
-        |v: &Violation| !evidence.patches.regions[lights[v.light as usize].region as usize].two_sided;
+        |v: &Violation| !evidence.ground.patches.regions[lights[v.light as usize].region as usize].two_sided;
     failing.retain(one_sided);
     failing
 }
@@ -127,13 +141,14 @@ fn cut(refiner: &mut Refiner, lights: &[Light], mut failing: Vec<Violation>, roo
 fn shrunk(number: u32, lights: &[Light], evidence: &Evidence, deepest: f64) -> Option<Light> {
     let light = &lights[number as usize];
     let (normal, centre) = (light.normal(), light.corners.iter().sum::<DVec3>() / 3.0);
-    let target = MARGIN * evidence.clearance;
+    let target = MARGIN * evidence.ground.clearance;
     SIZES.iter().find_map(|&size| {
         let smaller = light.corners.map(|v| centre + (v - centre) * size);
         let needed = |point| (rise(&smaller, point) + target) / point.normal.dot(normal);
         let depth = evidence.own_points(number as usize).map(needed).fold(f64::NEG_INFINITY, f64::max);
         let sunk = Light { corners: smaller.map(|v| v - normal * depth), ..*light };
-        let hides = depth.abs() <= deepest && judge(number as usize, &sunk, evidence).is_none();
+        let longest = light.corners[0].distance(light.corners[1]).max(light.corners[1].distance(light.corners[2]));
+        let hides = depth.abs() <= deepest.min(SINK_SHARE * longest) && judge(number as usize, &sunk, evidence).is_none();
         hides.then_some(sunk)
     })
 }

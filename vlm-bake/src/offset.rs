@@ -23,16 +23,19 @@ use rayon::prelude::*;
 use crate::clearance::self_lighting;
 use crate::correspondence::{Correspondence, Light, Standing};
 use crate::decimate::LightMesh;
-use crate::patches::Patches;
+use crate::ground::Ground;
 use crate::surface::SurfacePoint;
-use crate::way_out::WayOut;
 
 /// Lights are moved this much farther than the clearance that `verify` asks for, so that rounding on the way does not fail it.
 const MARGIN: f64 = 1.02;
 
-/// Rounds of moving and looking. Planes come in as lights move, so a few are needed; what is not hidden by then is
-/// refined or tagged.
+/// Rounds of moving and looking, of which every other one looks anew which light stands for which point. Planes come in as lights
+/// move, so a few are needed; what is not hidden by then is refined or tagged.
 const ROUNDS: usize = 6;
+
+/// A vertex moves by at most this share of its shortest edge. Higher values hide more lights behind rough surface instead of tagging
+/// them; their mesh then shrinks and turns away from the surface, and covers less of it.
+const EDGE_SHARE: f64 = 0.4;
 
 /// A vertex counts as below a plane where it misses it by less than this share of the clearance; the margin makes up for it.
 const TOLERANCE: f64 = 0.005;
@@ -40,17 +43,11 @@ const TOLERANCE: f64 = 0.005;
 /// What the offset looks at.
 pub struct Surroundings<'a> {
     /// The visible surface.
-    pub patches: &'a Patches,
+    pub ground: &'a Ground<'a>,
     /// Points on it.
     pub points: &'a [SurfacePoint],
-    /// Required distance behind the surface, metres.
-    pub clearance: f64,
-    /// Lights stand for surface at most this far away, metres.
-    pub reach: f64,
-    /// No vertex moves farther than this, metres.
+    /// No vertex moves farther than this, metres; less where its edges are short.
     pub deepest: f64,
-    /// Ways out of the far side of an object.
-    pub way_out: &'a WayOut,
 }
 
 /// One plane below which a vertex must lie.
@@ -68,10 +65,17 @@ struct Plane {
 /// surfaces stay where they are: no place behind hides them, so they are tagged later.
 pub fn offset(mesh: &mut LightMesh, rest: &[DVec3], emits: &[bool], around: &Surroundings) {
     let mut planes = face_planes(mesh, rest, emits, around);
+    let deepest = deepest(mesh, rest, around);
     let mut dirty: Vec<u32> = (0..rest.len() as u32).collect();
-    for _ in 0..ROUNDS {
-        settle(mesh, rest, &planes, &dirty, around);
-        let found = crossed_planes(mesh, rest, emits, around);
+    let mut standing = Standing::default();
+    for round in 0..ROUNDS {
+        settle(mesh, rest, &planes, &dirty, &deepest, around);
+        let lights = mesh.lights();
+        if round % 2 == 0 {
+            let correspondence = Correspondence::new(around.ground, &lights, |l| emits[l]);
+            standing = Standing::new(&correspondence.of(around.points), lights.len());
+        }
+        let found = crossed_planes(mesh, &lights, rest, &standing, around);
         dirty.clear();
         for (vertex, plane) in found {
             let known = &mut planes[vertex as usize];
@@ -81,7 +85,7 @@ pub fn offset(mesh: &mut LightMesh, rest: &[DVec3], emits: &[bool], around: &Sur
             }
         }
         dirty.dedup();
-        if dirty.is_empty() {
+        if dirty.is_empty() && round % 2 == 0 {
             break;
         }
     }
@@ -91,13 +95,13 @@ pub fn offset(mesh: &mut LightMesh, rest: &[DVec3], emits: &[bool], around: &Sur
 fn face_planes(mesh: &LightMesh, rest: &[DVec3], emits: &[bool], around: &Surroundings) -> Vec<Vec<Plane>> {
     let mut planes = vec![Vec::new(); rest.len()];
     for (f, face) in mesh.faces.iter().enumerate() {
-        if !emits[f] || around.patches.regions[face.region as usize].two_sided {
+        if !emits[f] || around.ground.patches.regions[face.region as usize].two_sided {
             continue;
         }
         let corners = face.vertices.map(|v| rest[v as usize]);
         let normal = crate::topology::cross_of(corners).normalize_or_zero();
         for v in face.vertices {
-            planes[v as usize].push(Plane { normal, depth: MARGIN * around.clearance, triangle: u32::MAX });
+            planes[v as usize].push(Plane { normal, depth: MARGIN * around.ground.clearance, triangle: u32::MAX });
         }
     }
     planes
@@ -106,16 +110,14 @@ fn face_planes(mesh: &LightMesh, rest: &[DVec3], emits: &[bool], around: &Surrou
 /// The planes above which corners of lights lie that light points of these planes, by vertex.
 fn crossed_planes(
     mesh: &LightMesh,
+    lights: &[Light],
     rest: &[DVec3],
-    emits: &[bool],
+    standing: &Standing,
     around: &Surroundings,
 ) -> Vec<(u32, Plane)> {
-    let lights = mesh.lights();
-    let correspondence = Correspondence::new(around.patches, &lights, around.reach, |l| emits[l]);
-    let standing = Standing::new(&correspondence.of(around.points), lights.len());
     let crossed = |l: usize| {
         let face = mesh.faces[l];
-        let two_sided = around.patches.regions[face.region as usize].two_sided;
+        let two_sided = around.ground.patches.regions[face.region as usize].two_sided;
         let own = if two_sided { &[] } else { standing.of(l) };
         planes_of_light(&lights[l], face.vertices, own, rest, around)
     };
@@ -133,10 +135,10 @@ fn planes_of_light(
     around: &Surroundings,
 ) -> Vec<(u32, Plane)> {
     let normal = light.normal();
-    let target = MARGIN * around.clearance;
+    let target = MARGIN * around.ground.clearance;
     let mut found = Vec::new();
     for point in own.iter().map(|&p| &around.points[p as usize]) {
-        if self_lighting(&light.corners, normal, point, around.clearance) <= 0.0 {
+        if self_lighting(&light.corners, normal, point, around.ground.clearance) <= 0.0 {
             continue;
         }
         for (corner, v) in light.corners.into_iter().zip(vertices) {
@@ -149,13 +151,52 @@ fn planes_of_light(
     found
 }
 
+/// How far each vertex may move, metres: a vertex that moves by much of its edges' lengths turns its lights away from their surface.
+fn deepest(mesh: &LightMesh, rest: &[DVec3], around: &Surroundings) -> Vec<f64> {
+    let mut shortest = vec![f64::INFINITY; rest.len()];
+    for face in &mesh.faces {
+        for i in 0..3 {
+            let (a, b) = (face.vertices[i] as usize, face.vertices[(i + 1) % 3] as usize);
+            let length = rest[a].distance(rest[b]);
+            shortest[a] = shortest[a].min(length);
+            shortest[b] = shortest[b].min(length);
+        }
+    }
+    let limit = |edge: f64| around.deepest.min(EDGE_SHARE * edge).max(2.0 * around.ground.clearance);
+    shortest.into_iter().map(limit).collect()
+}
+
+/// The object of each vertex.
+fn objects_of(mesh: &LightMesh, around: &Surroundings) -> Vec<u32> {
+    let patches = around.ground.patches;
+    let mut object_of_region = vec![0; patches.regions.len()];
+    for (t, &region) in patches.triangle_region.iter().enumerate() {
+        object_of_region[region as usize] = patches.vertex_object[patches.triangles[t][0] as usize];
+    }
+    let mut objects = vec![0; mesh.positions.len()];
+    for face in &mesh.faces {
+        for v in face.vertices {
+            objects[v as usize] = object_of_region[face.region as usize];
+        }
+    }
+    objects
+}
+
 /// Moves some vertices from rest to where their planes want them.
-fn settle(mesh: &mut LightMesh, rest: &[DVec3], planes: &[Vec<Plane>], dirty: &[u32], around: &Surroundings) {
+fn settle(
+    mesh: &mut LightMesh,
+    rest: &[DVec3],
+    planes: &[Vec<Plane>],
+    dirty: &[u32],
+    deepest: &[f64],
+    around: &Surroundings,
+) {
+    let objects = objects_of(mesh, around);
     let place = |&v: &u32| {
-        let at = rest[v as usize];
-        let planes: Vec<Plane> =
-            planes[v as usize].iter().filter(|p| p.depth <= around.deepest).copied().collect();
-        (v, at + displacement(at, planes, around))
+        let (at, deepest) = (rest[v as usize], deepest[v as usize]);
+        let planes: Vec<Plane> = planes[v as usize].iter().filter(|p| p.depth <= deepest).copied().collect();
+        let object = objects[v as usize];
+        (v, at + displacement(at, planes, deepest, object, around))
     };
     let moved: Vec<(u32, DVec3)> = dirty.par_iter().map(place).collect();
     for (v, p) in moved {
@@ -165,9 +206,8 @@ fn settle(mesh: &mut LightMesh, rest: &[DVec3], planes: &[Vec<Plane>], dirty: &[
 
 /// The least displacement below as many of the planes as the depth allowed and the object's thickness permit: where it would be too
 /// long, or come out on another side, the plane that asks for most is given up.
-fn displacement(at: DVec3, mut planes: Vec<Plane>, around: &Surroundings) -> DVec3 {
-    let longest = around.deepest.max(2.0 * around.clearance);
-    let tolerance = TOLERANCE * around.clearance;
+fn displacement(at: DVec3, mut planes: Vec<Plane>, longest: f64, object: u32, around: &Surroundings) -> DVec3 {
+    let tolerance = TOLERANCE * around.ground.clearance;
     let mut delta = DVec3::ZERO;
     let mut binding: Vec<Plane> = Vec::new();
     // Each step takes one plane in or gives one up.
@@ -177,7 +217,7 @@ fn displacement(at: DVec3, mut planes: Vec<Plane>, around: &Surroundings) -> DVe
         let mut candidates = binding.clone();
         match worst {
             Some(worst) if above(&planes[worst]) > tolerance => candidates.push(planes.swap_remove(worst)),
-            _ if stays_inside(at, delta, around) => return delta,
+            _ if stays_inside(at, delta, object, around) => return delta,
             _ => give_up_deepest(&mut candidates),
         }
         let solution = loop {
@@ -204,10 +244,10 @@ fn give_up_deepest(planes: &mut Vec<Plane>) {
 }
 
 /// True if a vertex that moves so does not come out on another side, with room for the clearance.
-fn stays_inside(at: DVec3, delta: DVec3, around: &Surroundings) -> bool {
+fn stays_inside(at: DVec3, delta: DVec3, object: u32, around: &Surroundings) -> bool {
     let Some(direction) = delta.try_normalize() else { return true };
-    let start = at + direction * around.way_out.least_length();
-    !around.way_out.leads_out(start, at + delta + direction * (0.5 * around.clearance), |_| false)
+    let start = at + direction * around.ground.way_out.least_length();
+    !around.ground.way_out.leads_out(start, at + delta + direction * (0.5 * around.ground.clearance), object, |_| false)
 }
 
 /// The shortest `delta` with `normal . delta <= -depth` for each of at most four planes, and which of them hold it there; `None` if

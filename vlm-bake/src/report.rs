@@ -51,6 +51,10 @@ pub struct DecimationReport {
     pub reached: usize,
     /// The simplifier's error, metres.
     pub error_m: f64,
+    /// Mean distance of the surface from the faces that stand for it, metres.
+    pub mean_m: f64,
+    /// The distance that 99 % of the covered surface keeps, metres.
+    pub p99_m: f64,
 }
 
 /// The offset in figures.
@@ -73,6 +77,8 @@ pub struct AreaReport {
     pub lights_m2: f64,
     /// Area of the lights that carry a tag, square metres.
     pub tagged_m2: f64,
+    /// Area of the visible surface that some tag keeps dark from these lights, square metres; each side of a two-sided one once.
+    pub covered_by_tags_m2: f64,
 }
 
 /// The grid in figures.

@@ -55,6 +55,8 @@ pub struct WorldSample {
 #[derive(Clone, Copy)]
 struct Candidate<'a> {
     point: &'a SurfacePoint,
+    /// Where a sample would be: inside its triangle.
+    position: DVec3,
     albedo: Vec3,
     emission: Vec3,
 }
@@ -67,7 +69,7 @@ pub struct Sources<'a> {
     pub patches: &'a Patches,
     /// Per light, a number that it shares with the lights of its neighbourhood: parts of one face of the decimated mesh.
     pub group: &'a [u32],
-    /// Tag per light.
+    /// Tag per light; may be longer.
     pub tags: &'a [u32],
     /// Points on the visible surface.
     pub points: &'a [SurfacePoint],
@@ -119,7 +121,7 @@ fn candidates<'a>(sources: &Sources<'a>, number: usize) -> Vec<Candidate<'a>> {
         let point = &sources.points[p as usize];
         let triangle = sources.patches.triangle_source[point.triangle as usize];
         let surface = sources.scene.albedo_at(triangle as usize, point.barycentric, point.area as f32);
-        Candidate { point, albedo: surface.reflectance(), emission: surface.emission * PI }
+        Candidate { point, position: point.inner(sources.patches), albedo: surface.reflectance(), emission: surface.emission * PI }
     };
     let own = sources.standing.of(number);
     let with_area = own.iter().filter(|&&p| sources.points[p as usize].area > 0.0);
@@ -145,10 +147,10 @@ fn colour(
     let chosen = spread(candidates, count);
     light.samples = chosen
         .iter()
-        .map(|c| WorldSample { position: c.point.position, normal: c.point.normal, reflectance: Vec3::ZERO })
+        .map(|c| WorldSample { position: c.position, normal: c.point.normal, reflectance: Vec3::ZERO })
         .collect();
     for candidate in candidates {
-        let away = |s: &WorldSample| s.position.distance_squared(candidate.point.position);
+        let away = |s: &WorldSample| s.position.distance_squared(candidate.position);
         if let Some(nearest) = light.samples.iter_mut().min_by(|a, b| away(a).total_cmp(&away(b))) {
             nearest.reflectance += candidate.albedo * (each * ratio) * strength;
         }
@@ -160,8 +162,8 @@ fn colour(
 /// At most `count` candidates far from each other: first the one nearest to their centre, then always the farthest from all
 /// chosen (Gonzalez 1985).
 fn spread<'a>(candidates: &[Candidate<'a>], count: usize) -> Vec<Candidate<'a>> {
-    let centre = candidates.iter().map(|c| c.point.position).sum::<DVec3>() / candidates.len() as f64;
-    let mut away: Vec<f64> = candidates.iter().map(|c| -c.point.position.distance_squared(centre)).collect();
+    let centre = candidates.iter().map(|c| c.position).sum::<DVec3>() / candidates.len() as f64;
+    let mut away: Vec<f64> = candidates.iter().map(|c| -c.position.distance_squared(centre)).collect();
     let mut chosen: Vec<Candidate> = Vec::with_capacity(count);
     while chosen.len() < count.min(candidates.len()) {
         let Some(next) = (0..candidates.len()).max_by(|&a, &b| away[a].total_cmp(&away[b]).then(b.cmp(&a)))
@@ -171,7 +173,7 @@ fn spread<'a>(candidates: &[Candidate<'a>], count: usize) -> Vec<Candidate<'a>> 
         let first = chosen.is_empty();
         chosen.push(candidates[next]);
         for (away, c) in away.iter_mut().zip(candidates) {
-            let distance = c.point.position.distance_squared(candidates[next].point.position);
+            let distance = c.position.distance_squared(candidates[next].position);
             *away = if first { distance } else { away.min(distance) };
         }
     }

@@ -31,6 +31,8 @@ pub struct SignedNear {
     pub signed: f64,
     /// Unit pseudonormal of the nearest feature.
     pub normal: DVec3,
+    /// The triangle on which it lies, an index into the patches'.
+    pub triangle: u32,
 }
 
 impl<'a> IslandDistance<'a> {
@@ -57,7 +59,7 @@ impl<'a> IslandDistance<'a> {
         let away = local - nearest;
         // On the surface itself, where rounding hides the side, the height over the plane is the distance.
         let height = away.dot(normal);
-        Some(SignedNear { signed: away.length().copysign(height), normal })
+        Some(SignedNear { signed: away.length().copysign(height), normal, triangle: near.triangle })
     }
 
     /// The pseudonormal of the feature of a triangle on which a point lies.

@@ -24,6 +24,25 @@ pub struct SurfacePoint {
     pub back: bool,
 }
 
+/// A point whose least barycentric weight is at most this lies on an edge of its triangle.
+const ON_EDGE: f32 = 1e-4;
+
+/// A point on an edge stands for the surface this share of the way to the middle of the triangle. Higher values leave the last bit of
+/// it to its neighbours; lower values take the neighbour's for its own.
+const INNER_SHARE: f64 = 0.1;
+
+impl SurfacePoint {
+    /// The place itself, or where it lies on an edge or vertex, at which several surfaces meet, a place a little inside its triangle.
+    #[must_use]
+    pub fn inner(&self, patches: &Patches) -> DVec3 {
+        if self.barycentric.min_element() > ON_EDGE {
+            return self.position;
+        }
+        let centre = patches.corners(self.triangle as usize).iter().sum::<DVec3>() / 3.0;
+        self.position.lerp(centre, INNER_SHARE)
+    }
+}
+
 /// At least `count` points, area-uniform: one at every equal step of the area summed over the triangles, placed within its
 /// triangle by a low-discrepancy sequence.
 #[must_use]
@@ -78,6 +97,23 @@ pub fn spread_over([a, b, c]: [DVec3; 3], count: u32) -> impl Iterator<Item = DV
         let (u, v) = fold(plastic(index));
         a * (1.0 - u - v) + b * u + c * v
     })
+}
+
+/// The middle of a triangle, on each side that reflects; none if it has no area.
+#[must_use]
+pub fn centre_points(patches: &Patches, triangle: usize) -> Vec<SurfacePoint> {
+    let corners = patches.corners(triangle);
+    let Some(normal) = cross_of(corners).try_normalize() else { return Vec::new() };
+    let front = SurfacePoint {
+        position: corners.iter().sum::<DVec3>() / 3.0,
+        normal,
+        triangle: triangle as u32,
+        barycentric: Vec3::splat(1.0 / 3.0),
+        area: patches.area(triangle),
+        back: false,
+    };
+    let back = SurfacePoint { normal: -normal, back: true, ..front };
+    if patches.region(triangle).two_sided { vec![front, back] } else { vec![front] }
 }
 
 /// A point at every vertex and at the middle of every edge, on each side that reflects, once for each plane that meets there:

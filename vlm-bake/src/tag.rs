@@ -1,19 +1,18 @@
-//! Stage 7: ids for the lights that cannot hide behind their surface. A receiver is never lit by a light of its own tag.
+//! Stage 8: ids for the lights that cannot hide. A receiver is never lit by a light of its own tag.
 //!
-//! Automatic tags go to primitives: a primitive with two-sided surface, or one whose lights `verify` could not clear, gets an
-//! id; only the lights that need it carry it. An artist's tag (`extras.vlm.tag`) holds for all lights and primitives of its object, and
-//! wins.
+//! A tag covers as little as it can: the triangles that a light would light wrongly, and no others, so that a two-sided banner
+//! still lights the wall beside it though both are one primitive. Lights and such triangles form a graph, and each of its connected
+//! parts gets an id. Instances of a mesh share its triangles, and so their tags. An artist's tag (`extras.vlm.tag`) holds for all
+//! lights and triangles of its object, and wins.
 
 use std::collections::BTreeMap;
 
-use glam::DVec3;
+use petgraph::unionfind::UnionFind;
+use rustc_hash::FxHashMap;
 use serde::Serialize;
+use vlm_format::TriangleTags;
 
-use crate::correspondence::Light;
-use crate::patches::Patches;
 use crate::scene::Scene;
-use crate::topology::cross_of;
-use crate::verify::Violation;
 
 /// Why a tag was given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -21,10 +20,25 @@ use crate::verify::Violation;
 pub enum TagReason {
     /// The artist asked for it.
     Authored,
-    /// Both sides of the surface reflect.
+    /// Both sides of the surface reflect, so nothing lies behind it.
     TwoSided,
-    /// The check found lights that light their own surface or come out of it.
+    /// The object is too thin for a light behind its surface.
+    Thin,
+    /// The surface bends more than its lights can follow.
     Uncleared,
+}
+
+/// A light, and what it would light wrongly.
+#[derive(Clone, Debug)]
+pub struct Accused {
+    /// Index into [`Scene::objects`].
+    pub object: u32,
+    /// Area of the light, square metres.
+    pub area_m2: f64,
+    /// The scene's triangles that it must not light.
+    pub triangles: Vec<u32>,
+    /// Why it would.
+    pub reason: TagReason,
 }
 
 /// One tag, as the report shows it.
@@ -32,11 +46,11 @@ pub enum TagReason {
 pub struct TagReport {
     /// The id.
     pub tag: u32,
-    /// Node path of its object.
+    /// Node path of the object of its first light.
     pub object: String,
-    /// glTF mesh and primitive.
+    /// glTF mesh of its first triangle.
     pub mesh: u32,
-    /// Index of the primitive within the mesh.
+    /// Index within the mesh of that triangle's primitive.
     pub primitive: u32,
     /// Why.
     pub reason: TagReason,
@@ -44,6 +58,11 @@ pub struct TagReport {
     pub lights: usize,
     /// Their area in square metres.
     pub area_m2: f64,
+    /// Area of the visible surface that it keeps dark from them, square metres.
+    pub covers_m2: f64,
+    /// Share (0 to 1) of the light of these lights that they would rightly have sent to other parts of that surface, were nothing
+    /// between.
+    pub light_lost: f64,
 }
 
 /// The tags of a scene.
@@ -51,80 +70,152 @@ pub struct TagReport {
 pub struct Tags {
     /// Per light, 0 for none.
     pub lights: Vec<u32>,
-    /// By glTF mesh and primitive: instances of a mesh share the primitive, and so its tag.
-    by_primitive: BTreeMap<(u32, u32), TagReport>,
-    last: u32,
+    /// Per triangle of the scene, 0 for none; artists' tags are not in it.
+    pub triangles: Vec<u32>,
+    /// Artists' tags: glTF node and tag, ascending.
+    pub nodes: Vec<(u32, u32)>,
+    /// One entry per tag, ascending.
+    pub reports: Vec<TagReport>,
 }
 
-impl Tags {
-    /// `(mesh, primitive, tag)`, ascending.
-    #[must_use]
-    pub fn primitives(&self) -> Vec<(u32, u32, u32)> {
-        self.by_primitive.iter().map(|(&(mesh, primitive), entry)| (mesh, primitive, entry.tag)).collect()
+/// A triangle of a glTF primitive, whichever node draws it: mesh, primitive, index as drawn.
+type Drawn = (u32, u32, u32);
+
+fn drawn(scene: &Scene, triangle: u32) -> Drawn {
+    let primitive = &scene.primitives[scene.triangle_primitive[triangle as usize] as usize];
+    (primitive.mesh, primitive.primitive, scene.triangle_in_primitive[triangle as usize])
+}
+
+/// Gives tags to the accused; `None` for lights that do no wrong, which carry a tag only if an artist asked for it. `objects` tells
+/// the object of each light.
+#[must_use]
+pub fn tag(scene: &Scene, objects: &[u32], accused: &[Option<Accused>]) -> Tags {
+    let authored = |l: usize| scene.objects[objects[l] as usize].steering.tag;
+    let parts = Parts::new(scene, accused, |l| authored(l).is_none());
+    // Automatic ids follow the authored ones, so that the two never meet.
+    let mut last = scene.objects.iter().filter_map(|o| o.steering.tag).max().unwrap_or(0);
+    let mut id_of_part: FxHashMap<u32, u32> = FxHashMap::default();
+    let mut number = |part: u32| {
+        *id_of_part.entry(part).or_insert_with(|| {
+            last += 1;
+            last
+        })
+    };
+    let id = |l: usize| authored(l).or_else(|| parts.of_light(l).map(&mut number)).unwrap_or(0);
+    let lights: Vec<u32> = (0..accused.len()).map(id).collect();
+    let triangles = (0..scene.triangles.len() as u32)
+        .map(|t| parts.of_triangle(drawn(scene, t)).and_then(|part| id_of_part.get(&part).copied()).unwrap_or(0))
+        .collect();
+    let nodes: BTreeMap<u32, u32> =
+        scene.objects.iter().filter_map(|o| Some((o.node, o.steering.tag.filter(|&t| t != 0)?))).collect();
+    let mut tags = Tags { lights, triangles, nodes: nodes.into_iter().collect(), reports: Vec::new() };
+    tags.reports = reports(scene, objects, accused, &tags);
+    tags
+}
+
+/// The connected parts of the graph of lights and triangles.
+struct Parts {
+    light: Vec<Option<u32>>,
+    node_of_triangle: FxHashMap<Drawn, u32>,
+    part_of_node: Vec<u32>,
+}
+
+impl Parts {
+    fn new(scene: &Scene, accused: &[Option<Accused>], counts: impl Fn(usize) -> bool) -> Self {
+        let mut node_of_triangle: FxHashMap<Drawn, u32> = FxHashMap::default();
+        let mut joints = Vec::new();
+        let mut nodes = accused.len() as u32;
+        for (l, light) in accused.iter().enumerate().filter(|(l, _)| counts(*l)) {
+            for &triangle in light.iter().flat_map(|light| &light.triangles) {
+                let node = *node_of_triangle.entry(drawn(scene, triangle)).or_insert_with(|| {
+                    nodes += 1;
+                    nodes - 1
+                });
+                joints.push((l as u32, node));
+            }
+        }
+        let mut joined = UnionFind::<u32>::new(nodes as usize);
+        for &(light, triangle) in &joints {
+            joined.union(light, triangle);
+        }
+        let mut light = vec![None; accused.len()];
+        for (l, _) in joints {
+            light[l as usize] = Some(joined.find_mut(l));
+        }
+        Self { light, node_of_triangle, part_of_node: joined.into_labeling() }
     }
 
-    /// One entry per tagged primitive.
-    #[must_use]
-    pub fn report(&self) -> Vec<TagReport> {
-        self.by_primitive.values().cloned().collect()
+    fn of_light(&self, light: usize) -> Option<u32> {
+        self.light[light]
     }
 
-    /// The tag of a scene primitive, 0 for none.
-    #[must_use]
-    pub fn of_primitive(&self, scene: &Scene, primitive: u32) -> u32 {
-        let primitive = &scene.primitives[primitive as usize];
-        self.by_primitive.get(&(primitive.mesh, primitive.primitive)).map_or(0, |entry| entry.tag)
+    fn of_triangle(&self, triangle: Drawn) -> Option<u32> {
+        self.node_of_triangle.get(&triangle).map(|&node| self.part_of_node[node as usize])
     }
+}
 
-    /// Tags an authored light that lights the scene primitive for which it stands; returns the tag.
-    pub fn add_uncleared(&mut self, scene: &Scene, primitive: u32, corners: [DVec3; 3]) -> u32 {
-        self.add(scene, primitive, TagReason::Uncleared, 0.5 * cross_of(corners).length())
-    }
-
-    fn add(&mut self, scene: &Scene, primitive: u32, reason: TagReason, area_m2: f64) -> u32 {
-        let primitive = &scene.primitives[primitive as usize];
-        let object = &scene.objects[primitive.object as usize];
-        let (mesh, primitive) = (primitive.mesh, primitive.primitive);
-        let last = &mut self.last;
-        let entry = self.by_primitive.entry((mesh, primitive)).or_insert_with(|| {
-            let tag = object.steering.tag.unwrap_or_else(|| {
-                *last += 1;
-                *last
-            });
-            TagReport { tag, object: object.path.clone(), mesh, primitive, reason, lights: 0, area_m2: 0.0 }
+fn reports(scene: &Scene, objects: &[u32], accused: &[Option<Accused>], tags: &Tags) -> Vec<TagReport> {
+    let mut reports: BTreeMap<u32, TagReport> = BTreeMap::new();
+    for (l, &tag) in tags.lights.iter().enumerate().filter(|(_, tag)| **tag != 0) {
+        let object = &scene.objects[objects[l] as usize];
+        let reason = match &accused[l] {
+            Some(light) if object.steering.tag.is_none() => light.reason,
+            _ => TagReason::Authored,
+        };
+        let first = accused[l].as_ref().and_then(|light| light.triangles.first());
+        let entry = reports.entry(tag).or_insert_with(|| {
+            let (mesh, primitive, _) = first.map_or((0, 0, 0), |&t| drawn(scene, t));
+            let object = object.path.clone();
+            TagReport { tag, object, mesh, primitive, reason, ..TagReport::default() }
         });
         entry.reason = entry.reason.min(reason);
         entry.lights += 1;
-        entry.area_m2 += area_m2;
-        entry.tag
+        entry.area_m2 += accused[l].as_ref().map_or(0.0, |light| light.area_m2);
+    }
+    for (t, &tag) in tags.triangles.iter().enumerate().filter(|(_, tag)| **tag != 0) {
+        if let (Some(report), Some(corners)) = (reports.get_mut(&tag), scene.corners(t)) {
+            report.covers_m2 += 0.5 * crate::topology::cross_of(corners.map(|p| p.as_dvec3())).length();
+        }
+    }
+    reports.into_values().collect()
+}
+
+impl Default for TagReport {
+    fn default() -> Self {
+        Self {
+            tag: 0,
+            object: String::new(),
+            mesh: 0,
+            primitive: 0,
+            reason: TagReason::Uncleared,
+            lights: 0,
+            area_m2: 0.0,
+            covers_m2: 0.0,
+            light_lost: 0.0,
+        }
     }
 }
 
-/// Gives tags to the failing lights, to the lights of two-sided surfaces, and to all that the artist tagged.
-#[must_use]
-pub fn tag(
-    scene: &Scene,
-    patches: &Patches,
-    lights: &[Light],
-    violations: &[Violation],
-) -> Tags {
-    let mut failing = vec![false; lights.len()];
-    for violation in violations {
-        failing[violation.light as usize] = true;
+impl Tags {
+    /// The tags of primitives of one tag throughout, `(mesh, primitive, tag)`, and those of primitives whose triangles differ; both
+    /// ascending.
+    #[must_use]
+    pub fn of_primitives(&self, scene: &Scene) -> (Vec<(u32, u32, u32)>, Vec<TriangleTags>) {
+        let mut by_primitive: BTreeMap<(u32, u32), Vec<u32>> = BTreeMap::new();
+        for (t, &tag) in self.triangles.iter().enumerate().filter(|(_, tag)| **tag != 0) {
+            let of = &scene.primitives[scene.triangle_primitive[t] as usize];
+            let tags = by_primitive
+                .entry((of.mesh, of.primitive))
+                .or_insert_with(|| vec![0; of.drawn_triangles as usize]);
+            tags[scene.triangle_in_primitive[t] as usize] = tag;
+        }
+        let (mut whole, mut parts) = (Vec::new(), Vec::new());
+        for ((mesh, primitive), tags) in by_primitive {
+            match tags.first() {
+                Some(&tag) if tags.iter().all(|&t| t == tag) => whole.push((mesh, primitive, tag)),
+                _ => parts.push(TriangleTags { mesh, primitive, tags }),
+            }
+        }
+        (whole, parts)
     }
-    // Automatic ids follow the authored ones, so that the two never meet.
-    let last = scene.objects.iter().filter_map(|o| o.steering.tag).max().unwrap_or(0);
-    let mut tags = Tags { lights: vec![0; lights.len()], last, ..Tags::default() };
-    for (l, light) in lights.iter().enumerate() {
-        let region = &patches.regions[light.region as usize];
-        let object = &scene.objects[scene.primitives[region.primitive as usize].object as usize];
-        let reason = match object.steering.tag {
-            Some(_) => TagReason::Authored,
-            None if region.two_sided => TagReason::TwoSided,
-            None if failing[l] => TagReason::Uncleared,
-            None => continue,
-        };
-        tags.lights[l] = tags.add(scene, region.primitive, reason, light.area());
-    }
-    tags
 }

@@ -28,10 +28,13 @@ pub fn assemble(
     grid: Option<Grid>,
     options: &BakeOptions,
 ) -> VlmAsset {
+    let (primitive_tags, triangle_tags) = tags.of_primitives(scene);
     let mut asset = VlmAsset {
         generator: GENERATOR.to_owned(),
         settings: settings(options, grid.as_ref()),
-        primitive_tags: tags.primitives(),
+        primitive_tags,
+        triangle_tags,
+        node_tags: tags.nodes.clone(),
         sample_starts: vec![0],
         grid,
         ..VlmAsset::default()
@@ -103,6 +106,17 @@ fn unique(path: &str, ids: &mut FxHashMap<String, u32>) -> String {
     let uses = ids.entry(path.to_owned()).or_insert(0);
     *uses += 1;
     if *uses == 1 { path.to_owned() } else { unique(&format!("{path}#{uses}"), ids) }
+}
+
+/// A light's corners after a round trip through the file: single precision in the node's space. As they are where the transform has no
+/// inverse.
+#[must_use]
+pub fn as_stored(world_from_node: DMat4, corners: [DVec3; 3]) -> [DVec3; 3] {
+    if world_from_node.determinant() == 0.0 {
+        return corners;
+    }
+    let to_node = NodeSpace::new(world_from_node);
+    corners.map(|p| world_from_node.transform_point3(to_node.point(p).as_dvec3()))
 }
 
 /// World space to a node's.

@@ -1,0 +1,171 @@
+//! What is wrong with a light, if anything.
+//!
+//! A light fails
+//! - where it lights one of the surface points for which it stands ([`crate::correspondence`]), or comes nearer to that than
+//!   the clearance ([`crate::clearance::self_lighting`]);
+//! - where the straight way from one of these points through the solid to the nearest place of the light leads out into the
+//!   open on another side ([`crate::way_out`]), or would with a little more depth;
+//! - where a corner lies in front of its island, or the middle of an edge or its centre in front of another side of it
+//!   ([`crate::signed_distance`]): a side that faces more than 60 degrees away from the light. In front of its own side it may lie between
+//!   its corners: there it bridges a recess.
+
+use glam::{DVec3, Vec3, Vec3A};
+use rayon::prelude::*;
+
+use crate::bvh::nearest::closest_point;
+use crate::clearance::self_lighting;
+use crate::correspondence::{Light, Standing};
+use crate::ground::Ground;
+use crate::patches::Region;
+use crate::surface::SurfacePoint;
+
+/// A light comes out of its island when it lies less than this share of the clearance behind it: a mitred vertex at a sharp edge
+/// may be nearer to the edge than to either face.
+const POKE_SHARE: f64 = 0.25;
+
+/// The cosine below which a side of an island is another side than that for which a light stands.
+const OTHER_SIDE_COSINE: f64 = 0.5;
+
+/// The way from a point to its light is looked at where it goes inward by this cosine at least.
+const STRAIGHT_COSINE: f64 = 0.3;
+
+/// Why a light fails, and by how much.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Violation {
+    /// The light.
+    pub light: u32,
+    /// Number of surface points that it lights.
+    pub points: u32,
+    /// By how much it would have to move, metres.
+    pub depth: f64,
+    /// Where it is worst, world space.
+    pub place: DVec3,
+    /// It comes out on another side of its object.
+    pub pokes_out: bool,
+    /// The triangles of the patches whose receivers must not be lit by the light, ascending.
+    pub triangles: Vec<u32>,
+}
+
+/// All that the check looks at.
+pub struct Evidence<'a> {
+    /// The visible surface.
+    pub ground: &'a Ground<'a>,
+    /// Points on it.
+    pub points: &'a [SurfacePoint],
+    /// Which of them each light stands for.
+    pub standing: &'a Standing,
+}
+
+impl<'a> Evidence<'a> {
+    fn region(&self, light: &Light) -> &Region {
+        &self.ground.patches.regions[light.region as usize]
+    }
+
+    /// The surface points of a light.
+    pub fn own_points(&self, light: usize) -> impl Iterator<Item = &'a SurfacePoint> {
+        self.standing.of(light).iter().map(|&p| &self.points[p as usize])
+    }
+}
+
+/// Every light that fails, ascending. Lights of two-sided surfaces fail where they light their own points.
+#[must_use]
+pub fn verify(lights: &[Light], evidence: &Evidence) -> Vec<Violation> {
+    lights.par_iter().enumerate().filter_map(|(l, light)| judge(l, light, evidence)).collect()
+}
+
+/// What is wrong with a light, if anything.
+#[must_use]
+pub fn judge(number: usize, light: &Light, evidence: &Evidence) -> Option<Violation> {
+    let mut violation = Violation { light: number as u32, ..Violation::default() };
+    lit_points(number, light, evidence, &mut violation);
+    if !evidence.region(light).two_sided {
+        poke_between(number, light, evidence, &mut violation);
+        poke_beside(light, evidence, &mut violation);
+    }
+    violation.triangles.sort_unstable();
+    violation.triangles.dedup();
+    (violation.points > 0 || violation.pokes_out).then_some(violation)
+}
+
+impl Violation {
+    /// Notes a fault of that depth at a place; the deepest stays.
+    fn note(&mut self, depth: f64, place: DVec3) {
+        if depth > self.depth {
+            (self.depth, self.place) = (depth, place);
+        }
+    }
+}
+
+/// Looks for points of a light that it lights.
+fn lit_points(number: usize, light: &Light, evidence: &Evidence, violation: &mut Violation) {
+    let normal = light.normal();
+    for point in evidence.own_points(number) {
+        let depth = self_lighting(&light.corners, normal, point, evidence.ground.clearance);
+        if depth > 0.0 {
+            violation.points += 1;
+            violation.triangles.push(point.triangle);
+            violation.note(depth, point.position);
+        }
+    }
+}
+
+/// Looks for surface between a light's points and the light.
+fn poke_between(number: usize, light: &Light, evidence: &Evidence, violation: &mut Violation) {
+    for point in evidence.own_points(number) {
+        let from = point.inner(evidence.ground.patches);
+        let corners = light.corners.map(|v| (v - from).as_vec3a());
+        let way = Vec3::from(closest_point(&corners, Vec3A::ZERO)).as_dvec3();
+        // A point behind its light lies in a recess that the light bridges; one beside it says nothing of what is behind itself.
+        let behind = way.dot(-point.normal) > STRAIGHT_COSINE * way.length();
+        if behind && leads_out(point, from, from + way, evidence, &mut violation.triangles) {
+            violation.pokes_out = true;
+            violation.note(way.length(), point.position);
+        }
+    }
+}
+
+/// True if the way from a surface point to a place behind it leads out on another side; then the triangles on the way, and that
+/// of the point, must not be lit.
+fn leads_out(
+    point: &SurfacePoint,
+    from: DVec3,
+    place: DVec3,
+    evidence: &Evidence,
+    triangles: &mut Vec<u32>,
+) -> bool {
+    let ground = evidence.ground;
+    let start = from - point.normal * ground.way_out.least_length();
+    let Some(direction) = (place - start).try_normalize() else { return false };
+    let end = place + direction * (POKE_SHARE * ground.clearance);
+    let object = ground.patches.vertex_object[ground.patches.triangles[point.triangle as usize][0] as usize];
+    let own = ground.patches.triangle_source[point.triangle as usize];
+    let out = ground.way_out.leads_out(start, end, object, |triangle| triangle == own);
+    if out {
+        triangles.push(point.triangle);
+        let crossed = ground.way_out.crossed(start, end, object);
+        // Sources of patches ascend.
+        triangles.extend(crossed.iter().filter_map(|t| {
+            ground.patches.triangle_source.binary_search(t).ok().map(|t| t as u32)
+        }));
+    }
+    out
+}
+
+/// Looks for places of a light that lie in front of its island.
+fn poke_beside(light: &Light, evidence: &Evidence, violation: &mut Violation) {
+    let [a, b, c] = light.corners;
+    let (normal, room) = (light.normal(), POKE_SHARE * evidence.ground.clearance);
+    let island = evidence.region(light).island;
+    for (i, place) in
+        [a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0].into_iter().enumerate()
+    {
+        let Some(near) = evidence.ground.distance.at(place, island) else { continue };
+        let bridges = i >= 3 && near.normal.dot(normal) >= OTHER_SIDE_COSINE;
+        let out = near.signed + room;
+        if out > 0.0 && !bridges {
+            violation.pokes_out = true;
+            violation.triangles.push(near.triangle);
+            violation.note(out, place);
+        }
+    }
+}

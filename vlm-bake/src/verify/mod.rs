@@ -1,0 +1,305 @@
+//! Stage 7: proves that no light lights the surface for which it stands, and that none comes out on another side of its object.
+//! `docs/behind-the-geometry.md` has the definition in words.
+//!
+//! [`judge`] says what is wrong with a light; the baker uses it to mend and tag. [`verify_asset`] checks a finished asset
+//! against a scene, from nothing but what the file holds.
+
+pub mod judge;
+mod self_light;
+
+use glam::{DMat4, DVec3};
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+use serde::Serialize;
+use vlm_format::VlmAsset;
+
+use crate::bvh::Bvh;
+use crate::correspondence::{Correspondence, Light, Standing};
+use crate::ground::Ground;
+use crate::patches::{Patches, patches};
+use crate::render::triangle_tags;
+use crate::scene::Scene;
+use crate::slivers::MAX_ASPECT;
+use crate::surface::SurfacePoint;
+use crate::topology::{aspect_ratio, cross_of};
+
+use judge::{Evidence, Violation, judge};
+pub use self_light::{SelfLight, self_light};
+
+/// A light belongs to surface that looks its way by this cosine.
+const LEAST_COSINE: f64 = 0.5;
+
+/// The result of the check of an asset.
+#[derive(Clone, Debug, Default)]
+pub struct Verification {
+    /// Area-uniform points of the visible surface (at least 200,000, at least 20 per light), its vertices and edge midpoints, and the
+    /// lights' own samples. Those last three have no area.
+    pub points: Vec<SurfacePoint>,
+    /// The light that stands for each point.
+    pub light_of_point: Vec<Option<u32>>,
+    /// One for each light that fails, tagged or not, ascending by light.
+    pub findings: Vec<Finding>,
+    /// The clearance asked for, metres.
+    pub required_m: f64,
+    /// The visible surface; [`SurfacePoint::triangle`] counts its triangles.
+    pub patches: Patches,
+    /// The light that the surface gets from its own lights.
+    pub self_light: SelfLight,
+}
+
+/// What a light does wrong.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FindingKind {
+    /// It lights points of the surface for which it stands, or comes nearer to that than the clearance.
+    #[default]
+    LightsItself,
+    /// It comes out of its object: on another side, or in front of its own.
+    PokesOut,
+    /// It is longer than 100 times its height: single precision cannot hold its form factor.
+    TooThin,
+}
+
+/// A light that fails.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Finding {
+    /// Number of the light in the asset.
+    pub light: u32,
+    /// What it does wrong; the worse of two.
+    pub kind: FindingKind,
+    /// Number of surface points that it lights.
+    pub points: u32,
+    /// By how much it would have to move, metres.
+    pub depth_m: f64,
+    /// Where it is worst, world space.
+    pub place: DVec3,
+    /// The light's normal.
+    pub normal: DVec3,
+    /// Node path of its object.
+    pub object: String,
+    /// Tags keep it away from all that it would light wrongly, so nothing is seen of it.
+    pub tagged: bool,
+}
+
+/// The result of the check, as the report shows it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct ClearanceReport {
+    /// Surface points checked.
+    pub samples: u64,
+    /// Surface points lit by their own light, and lights that come out or are too thin, where no tag keeps that light away.
+    pub violations: u64,
+    /// The greatest distance by which a violating light would have to move, metres.
+    pub worst_m: f64,
+    /// The clearance asked for, metres.
+    pub required_m: f64,
+    /// Light that the surface gets from its own lights.
+    pub self_light: SelfLight,
+}
+
+impl Verification {
+    /// The lights that fail and that no tag mends.
+    pub fn untagged(&self) -> impl Iterator<Item = &Finding> {
+        self.findings.iter().filter(|finding| !finding.tagged)
+    }
+
+    /// The check in figures.
+    #[must_use]
+    pub fn report(&self) -> ClearanceReport {
+        let count = |f: &Finding| u64::from(f.points) + u64::from(f.kind != FindingKind::LightsItself);
+        ClearanceReport {
+            samples: self.points.len() as u64,
+            violations: self.untagged().map(count).sum(),
+            worst_m: self.untagged().map(|f| f.depth_m).fold(0.0, f64::max),
+            required_m: self.required_m,
+            self_light: self.self_light,
+        }
+    }
+}
+
+/// Checks an asset against the scene that it lights.
+///
+/// The surface is grouped into regions as the bake did, by the budget in [`vlm_format::Settings::lights`]; a light's region is that of
+/// the surface on which its first sample lies.
+#[must_use]
+pub fn verify_asset(scene: &Scene, asset: &VlmAsset) -> Verification {
+    let patches = patches(scene, &scene.triangle_surfaces(), asset.settings.lights);
+    let mut verification = check(scene, asset, &Ground::new(scene, &patches));
+    verification.patches = patches;
+    verification
+}
+
+/// The same on a surface that is prepared already; [`Verification::patches`] stays empty.
+#[must_use]
+pub fn check(scene: &Scene, asset: &VlmAsset, ground: &Ground) -> Verification {
+    let placed = placed_lights(scene, asset, ground);
+    let lights: Vec<Light> = placed.iter().map(|p| p.light).collect();
+    let mut points = ground.points(asset.settings.lights as usize);
+    let derived = |l: usize| !placed[l].authored && placed[l].stands;
+    let mut light_of_point = Correspondence::new(ground, &lights, derived).of(&points);
+    for (l, light) in placed.iter().enumerate() {
+        light_of_point.extend(light.samples.iter().map(|_| Some(l as u32)));
+        points.extend(&light.samples);
+    }
+    let standing = Standing::new(&light_of_point, lights.len());
+    let evidence = Evidence { ground, points: &points, standing: &standing };
+    let tags = ReceiverTags::new(scene, asset, ground.patches);
+    let find = |l: usize| finding(scene, l, &placed[l], &evidence, &tags);
+    let findings = (0..lights.len()).into_par_iter().filter_map(find).collect();
+    let ignores = |point: &SurfacePoint, light: u32| tags.ignores(point.triangle, light);
+    let self_light = self_light(&lights, &points, &light_of_point, ignores);
+    let required_m = ground.clearance;
+    Verification { points, light_of_point, findings, required_m, self_light, patches: Patches::default() }
+}
+
+/// What is wrong with a light of an asset, if anything.
+fn finding(
+    scene: &Scene,
+    number: usize,
+    placed: &Placed,
+    evidence: &Evidence,
+    tags: &ReceiverTags,
+) -> Option<Finding> {
+    let light = &placed.light;
+    let bare = Finding {
+        light: number as u32,
+        normal: light.normal(),
+        object: scene.objects[placed.object].path.clone(),
+        ..Finding::default()
+    };
+    if aspect_ratio(light.corners) > MAX_ASPECT * (1.0 + ASPECT_ROUNDING) {
+        let place = light.corners.iter().sum::<DVec3>() / 3.0;
+        return Some(Finding { kind: FindingKind::TooThin, place, ..bare });
+    }
+    let violation = judge(number, light, evidence)?;
+    // An artist may place a light in the open; it must only not light what it stands for.
+    if placed.authored && violation.points == 0 {
+        return None;
+    }
+    if std::env::var("DBG").is_ok() && !violation.triangles.iter().all(|&triangle| tags.ignores(triangle, number as u32)) { eprintln!("check region {} {violation:?} tags {:?}", light.region, violation.triangles.iter().map(|&t| tags.triangles[t as usize]).collect::<Vec<_>>()); }
+    let Violation { points, depth, place, pokes_out, triangles, .. } = violation;
+    let kind = if pokes_out { FindingKind::PokesOut } else { FindingKind::LightsItself };
+    let tagged = triangles.iter().all(|&triangle| tags.ignores(triangle, number as u32));
+    Some(Finding { kind, points, depth_m: depth, place, tagged, ..bare })
+}
+
+/// Corners in single precision and a transform may stretch a light by this share.
+const ASPECT_ROUNDING: f64 = 1e-3;
+
+/// The tags of the patches' triangles and of the lights.
+struct ReceiverTags<'a> {
+    triangles: Vec<u32>,
+    lights: &'a [u32],
+}
+
+impl<'a> ReceiverTags<'a> {
+    fn new(scene: &Scene, asset: &'a VlmAsset, patches: &Patches) -> Self {
+        let of_scene = triangle_tags(scene, asset);
+        let triangles = patches.triangle_source.iter().map(|&t| of_scene[t as usize]).collect();
+        Self { triangles, lights: &asset.tags }
+    }
+
+    fn ignores(&self, triangle: u32, light: u32) -> bool {
+        let tag = self.lights.get(light as usize).copied().unwrap_or(0);
+        tag != 0 && tag == self.triangles[triangle as usize]
+    }
+}
+
+/// A light of an asset in world space.
+struct Placed {
+    light: Light,
+    object: usize,
+    authored: bool,
+    /// Its region is known.
+    stands: bool,
+    /// Its samples on the surface.
+    samples: Vec<SurfacePoint>,
+}
+
+fn placed_lights(scene: &Scene, asset: &VlmAsset, ground: &Ground) -> Vec<Placed> {
+    let object_of_node: FxHashMap<u32, usize> =
+        scene.objects.iter().enumerate().map(|(o, object)| (object.node, o)).collect();
+    let surface = SurfaceSearch::new(ground.patches);
+    let mut placed = Vec::with_capacity(asset.triangles.len());
+    for vlm in &asset.vlms {
+        let Some(&object) = object_of_node.get(&vlm.node) else { continue };
+        let world = scene.objects[object].world_from_node;
+        let numbers = vlm.lights[0] as usize..(vlm.lights[0] + vlm.lights[1]) as usize;
+        let place = |l: usize| place(asset, l, object, world, vlm.authored, &surface);
+        placed.par_extend(numbers.into_par_iter().map(place));
+    }
+    placed
+}
+
+fn place(
+    asset: &VlmAsset,
+    l: usize,
+    object: usize,
+    world: DMat4,
+    authored: bool,
+    surface: &SurfaceSearch,
+) -> Placed {
+    let mut corners =
+        asset.triangles[l].map(|v| world.transform_point3(asset.positions[v as usize].as_dvec3()));
+    if world.determinant() < 0.0 {
+        corners.swap(1, 2);
+    }
+    let normal = cross_of(corners).normalize_or_zero();
+    let of_light = asset.sample_starts[l] as usize..asset.sample_starts[l + 1] as usize;
+    let world_from_normal = glam::DMat3::from_mat4(world).inverse().transpose();
+    let samples: Vec<SurfacePoint> = asset.samples[of_light]
+        .iter()
+        .filter_map(|s| {
+            let normal = (world_from_normal * s.normal.as_dvec3()).normalize_or_zero();
+            surface.at(world.transform_point3(s.position.as_dvec3()), normal)
+        })
+        .collect();
+    let centre = corners.iter().sum::<DVec3>() / 3.0;
+    let own = samples.first().copied().or_else(|| surface.at(centre, normal));
+    let region = own.map_or(0, |p| surface.patches.triangle_region[p.triangle as usize]);
+    let light = Light { corners, region, back: own.is_some_and(|p| p.back) };
+    Placed { light, object, authored, stands: own.is_some(), samples }
+}
+
+/// Finds the surface on which a sample lies.
+struct SurfaceSearch<'a> {
+    patches: &'a Patches,
+    bvh: Bvh,
+    origin: DVec3,
+    normals: Vec<DVec3>,
+}
+
+impl<'a> SurfaceSearch<'a> {
+    fn new(patches: &'a Patches) -> Self {
+        let origin = patches.positions.first().copied().unwrap_or_default();
+        let local: Vec<glam::Vec3> = patches.positions.iter().map(|p| (*p - origin).as_vec3()).collect();
+        let normal = |t: usize| cross_of(patches.corners(t)).normalize_or_zero();
+        Self {
+            patches,
+            bvh: Bvh::new(&local, &patches.triangles),
+            origin,
+            normals: (0..patches.triangles.len()).map(normal).collect(),
+        }
+    }
+
+    /// The surface point nearest to `p` that looks along `normal`, on whichever side reflects.
+    fn at(&self, p: DVec3, normal: DVec3) -> Option<SurfacePoint> {
+        let cosine = |t: u32| self.normals[t as usize].dot(normal);
+        let alike = |t: u32| {
+            let two_sided = self.patches.region(t as usize).two_sided;
+            (if two_sided { cosine(t).abs() } else { cosine(t) }) > LEAST_COSINE
+        };
+        let near = self.bvh.closest((p - self.origin).as_vec3(), f32::INFINITY, alike)?;
+        let back = cosine(near.triangle) < 0.0;
+        let own = self.normals[near.triangle as usize];
+        let position = near.point.as_dvec3() + self.origin;
+        let corners = self.patches.corners(near.triangle as usize);
+        Some(SurfacePoint {
+            position,
+            normal: if back { -own } else { own },
+            triangle: near.triangle,
+            barycentric: crate::topology::barycentric(corners, position).as_vec3(),
+            area: 0.0,
+            back,
+        })
+    }
+}
