@@ -19,12 +19,14 @@ use crate::options::BakeOptions;
 use crate::patches::{Patches, patches};
 use crate::progress::Progress;
 use crate::refine::{Refiner, Snap};
+use crate::render::triangle_tags;
 use crate::report::{AreaReport, DecimationReport, GridReport, OffsetReport, Report};
 use crate::samples::{BakedLight, Sources, samples};
 use crate::scene::Scene;
 use crate::slivers::MAX_ASPECT;
 use crate::surface::SurfacePoint;
 use crate::tag::{Accused, TagReason, Tags, tag};
+use crate::tag_cost::measure;
 use crate::topology::aspect_ratio;
 use crate::verify::check;
 use crate::verify::judge::{judge, Evidence, Violation, verify};
@@ -137,6 +139,8 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
 
     clock.stage("prove");
     let proof = check(scene, &asset, &ground);
+    let mut tags = tags;
+    measure(&patches, &baked, &triangle_tags(scene, &asset), &proof, &mut tags.reports);
     if std::env::var("DBG").is_ok() {
         for f in proof.untagged().take(12) {
             let b = &baked[f.light as usize];

@@ -25,6 +25,7 @@ pub mod offset;
 pub mod mend;
 pub mod verify;
 pub mod tag;
+pub mod tag_cost;
 pub mod samples;
 pub mod authored;
 pub mod grid;

@@ -10,7 +10,8 @@ impl WorstPlace {
         match self.trouble {
             Trouble::LightsItself => "A light lights its own surface",
             Trouble::PokesOut => "A light comes out of its object",
-            Trouble::TooThin => "Nothing to hide a light behind",
+            Trouble::Sheet => "Two-sided: nothing to hide a light behind",
+            Trouble::Sliver => "A light is a sliver",
             Trouble::Uncovered => "No light stands for this surface",
             Trouble::Far => "Light far from its surface",
         }
@@ -26,9 +27,14 @@ impl WorstPlace {
                     length(required_m)
                 )
             }
-            Trouble::PokesOut => format!("It shows on another side, by {by}."),
-            Trouble::TooThin => {
-                format!("The surface is a sheet or thinner than the lights need; they come {by} too near.")
+            Trouble::PokesOut => {
+                format!("It shows on another side, or in front of its own: it would have to move by {by}.")
+            }
+            Trouble::Sheet => format!(
+                "Both sides of this surface reflect, so whichever side a light lies on, it shines on the other. It would have to move by {by}."
+            ),
+            Trouble::Sliver => {
+                "It is longer than 100 times its height: single precision cannot hold its light.".to_owned()
             }
             Trouble::Uncovered => format!(
                 "{:.3} m², {} of the scene's surface, bounce no light: too small or too isolated for the budget.",
@@ -57,14 +63,17 @@ impl WorstPlace {
             (Trouble::PokesOut, false) => format!(
                 "Make {name} at least {thick} thick here, or {finer}. If it stays, set `extras.vlm.tag` on it."
             ),
-            (Trouble::TooThin, true) => format!(
-                "Fine as it is if {name} is meant to be a sheet: its tag keeps its lights off it. Otherwise close it into a solid at \
-                 least {thick} thick, single-sided."
+            (Trouble::Sheet, true) => format!(
+                "Fine as it is if {name} is meant to be a sheet: a tag keeps its lights off it. Otherwise close it into a solid at least \
+                 {thick} thick, single-sided."
             ),
-            (Trouble::TooThin, false) => format!(
+            (Trouble::Sheet, false) => format!(
                 "Close {name} into a solid at least {thick} thick, or set `extras.vlm.tag` on it; set `extras.vlm.exclude` if its light does \
                  not matter."
             ),
+            (Trouble::Sliver, _) => {
+                format!("If an artist made it, divide it into triangles of better shape. Otherwise {finer}.")
+            }
             (Trouble::Uncovered, _) => format!(
                 "If its light matters, {finer}, or join it to the surface that it touches. If not, leave it."
             ),

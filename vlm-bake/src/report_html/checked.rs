@@ -1,8 +1,9 @@
 //! What the check of the lights found, in figures.
 
-use super::stand_in::{SelfLight, Verification};
+use crate::report::Report;
+use crate::verify::{SelfLight, Verification};
 
-/// The check summed up.
+/// The check summed up. All but the first two is the bake's own.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Checked {
     /// Lights that fail and that no tag keeps away.
@@ -11,31 +12,35 @@ pub struct Checked {
     pub depth_m: f64,
     /// Required clearance, metres.
     pub required_m: f64,
-    /// The light that surface receives from its own region.
+    /// Surface points looked at.
+    pub samples: u64,
+    /// The light that surface receives from lights that stand for it.
     pub self_light: SelfLight,
     /// Area of the surface that reflects or emits, square metres.
     pub visible_m2: f64,
-    /// Part of it for which no light stands.
-    pub uncovered_m2: f64,
+    /// Share of it for which no light stands.
+    pub uncovered: f64,
+    /// Share of the lights' area that carries a tag.
+    pub tagged: f64,
+    /// Share of the surface that bears a tag.
+    pub covered_by_tags: f64,
 }
 
 impl Checked {
     /// Sums up.
-    pub fn of(verification: &Verification) -> Self {
-        let open = || verification.findings.iter().filter(|f| !f.tagged);
-        let points = verification.points.iter().zip(&verification.light_of_point);
+    pub fn of(verification: &Verification, report: &Report) -> Self {
+        let area = &report.area;
+        let share = |part: f64, whole: f64| if whole > 0.0 { (part / whole).clamp(0.0, 1.0) } else { 0.0 };
         Self {
-            open: open().count(),
-            depth_m: open().map(|f| f.depth_m).fold(0.0, f64::max),
-            required_m: verification.required_m,
-            self_light: verification.self_light,
-            visible_m2: verification.points.iter().map(|p| p.area).sum(),
-            uncovered_m2: points.filter(|(_, light)| light.is_none()).map(|(p, _)| p.area).sum(),
+            open: verification.untagged().count(),
+            depth_m: verification.untagged().map(|f| f.depth_m).fold(0.0, f64::max),
+            required_m: report.clearance.required_m,
+            samples: report.clearance.samples,
+            self_light: report.clearance.self_light,
+            visible_m2: area.visible_m2,
+            uncovered: share(area.uncovered_m2, area.visible_m2),
+            tagged: share(area.tagged_m2, area.lights_m2),
+            covered_by_tags: share(area.covered_by_tags_m2, area.visible_m2),
         }
-    }
-
-    /// Share of the surface for which no light stands.
-    pub fn uncovered(&self) -> f64 {
-        self.uncovered_m2 / self.visible_m2.max(f64::MIN_POSITIVE)
     }
 }

@@ -4,17 +4,18 @@ use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 use vlm_format::VlmAsset;
 
-use super::correspondence::{Correspondence, Place};
+use super::correspondence::{Place, Places};
 use super::lights::WorldLights;
-use super::stand_in::{FindingKind, Verification};
-use super::tagged::SurfaceTags;
 use crate::bvh::nearest::closest_point;
 use crate::camera::CameraRays;
 use crate::gbuffer::GBuffer;
+use crate::ground::Ground;
 use crate::patches::Patches;
+use crate::render::triangle_tags;
 use crate::scene::{Camera, Scene};
 use crate::shade::{SurfacePoint, TraceScene};
 use crate::surface::SurfacePoint as PatchPoint;
+use crate::verify::{FindingKind, Verification};
 
 /// A pixel's point is known in single precision; it counts as lit by its light only below this share of the clearance.
 const ROUNDING: f64 = 0.98;
@@ -31,10 +32,12 @@ pub struct Evidence<'a> {
     pub lights: &'a WorldLights,
     /// The check.
     pub verification: &'a Verification,
+    /// The visible surface; the check's points count its triangles.
+    pub patches: &'a Patches,
     /// Which light stands where.
-    pub correspondence: Correspondence<'a>,
-    /// Tags of the surface.
-    pub tags: SurfaceTags<'a>,
+    pub places: Places<'a>,
+    /// The tag of each triangle of the scene, 0 for none.
+    pub surface_tags: Vec<u32>,
     /// The region for which each light stands: that of the first of its points; `None` for a light without points.
     pub region_of_light: Vec<Option<u32>>,
     /// Per light: whether it comes out somewhere, and then whether a tag keeps it away.
@@ -95,9 +98,11 @@ impl<'a> Evidence<'a> {
         scene: &'a Scene,
         asset: &'a VlmAsset,
         lights: &'a WorldLights,
+        ground: &Ground<'a>,
         verification: &'a Verification,
     ) -> Self {
-        let Verification { patches, points, light_of_point, findings, .. } = verification;
+        let Verification { points, light_of_point, findings, .. } = verification;
+        let patches = ground.patches;
         let mut pokes_out = vec![None; asset.triangles.len()];
         for finding in findings.iter().filter(|f| f.kind == FindingKind::PokesOut) {
             pokes_out[finding.light as usize] = Some(finding.tagged);
@@ -108,8 +113,9 @@ impl<'a> Evidence<'a> {
             asset,
             lights,
             verification,
-            correspondence: Correspondence::new(scene, verification, lights),
-            tags: SurfaceTags::new(scene, asset),
+            patches,
+            places: Places::new(scene, ground, verification, lights),
+            surface_tags: triangle_tags(scene, asset),
             region_of_light: regions_of_lights(patches, points, light_of_point, asset.triangles.len()),
             pokes_out,
         }
@@ -129,11 +135,17 @@ impl<'a> Evidence<'a> {
     /// The scene's primitive for which a light stands: that of its region, else of the surface nearest to it.
     pub fn primitive_of_light(&self, light: usize) -> Option<u32> {
         if let Some(region) = self.region_of_light.get(light).copied().flatten() {
-            return Some(self.verification.patches.regions[region as usize].primitive);
+            return Some(self.patches.regions[region as usize].primitive);
         }
         let centre = self.lights.corners.get(light)?.iter().sum::<DVec3>() / 3.0;
         let near = self.trace.bvh.closest(centre.as_vec3(), f32::INFINITY, |_| true)?;
         self.scene.triangle_primitive.get(near.triangle as usize).copied()
+    }
+
+    /// True if a light stands for a surface of which both sides reflect.
+    pub fn is_sheet(&self, light: u32) -> bool {
+        let region = self.region_of_light.get(light as usize).copied().flatten();
+        region.is_some_and(|region| self.patches.regions[region as usize].two_sided)
     }
 
     /// The name of a primitive's material; empty if there is none.
@@ -144,14 +156,14 @@ impl<'a> Evidence<'a> {
     }
 
     fn fact(&self, point: SurfacePoint, facing: f32) -> Fact {
-        let place = self.correspondence.light_at(&point);
+        let place = self.places.light_at(&point);
         let light = match place {
             Place::Light(light) => {
                 self.light_fact(light as usize, point.position.as_dvec3(), point.geometric_normal.as_dvec3())
             }
             _ => LightFact::default(),
         };
-        Fact { point, facing, place, surface_tag: self.tags.of(point.triangle), light }
+        Fact { point, facing, place, surface_tag: self.surface_tags.get(point.triangle as usize).copied().unwrap_or(0), light }
     }
 
     /// How a light lies behind a point.

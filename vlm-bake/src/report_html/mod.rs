@@ -1,11 +1,9 @@
 //! The report of a bake as a page for artists: one HTML file with everything in it.
 //!
-//! Facts first (`stand_in, lights, tagged -> correspondence -> facts`), then what is made of them: pictures, tables, places, a
-//! verdict, the page. The same bake gives the same page, but for the seconds by stage.
+//! Facts first (the check, `lights -> correspondence -> facts`), then what is made of them: pictures, tables, places, a verdict, the
+//! page. The same bake gives the same page, but for the seconds by stage.
 
 mod lights;
-mod tagged;
-mod stand_in;
 mod correspondence;
 mod facts;
 mod views;
@@ -13,7 +11,6 @@ mod colour;
 mod encode;
 mod pictures;
 mod objects;
-mod tag_cost;
 mod text;
 mod checked;
 mod places;
@@ -29,7 +26,10 @@ use image::ImageError;
 use maud::{Markup, html};
 
 use crate::bake::Bake;
+use crate::ground::Ground;
+use crate::patches::patches;
 use crate::scene::{Camera, Scene};
+use crate::verify::check;
 use advice::Remedies;
 use checked::Checked;
 use facts::Evidence;
@@ -38,7 +38,6 @@ use objects::{Grouping, ObjectFigures};
 use page::{CloseUp, Gallery, Page};
 use pictures::Subject;
 use places::WorstPlace;
-use stand_in::verify_asset;
 
 /// Size of the pictures, pixels. Larger ones show smaller lights and take more space.
 const PICTURE: [u32; 2] = [480, 360];
@@ -76,16 +75,18 @@ pub struct Subjects<'a> {
 pub fn report_html(subjects: &Subjects) -> Result<String, ImageError> {
     let Subjects { scene, bake, .. } = *subjects;
     let (asset, report) = (&bake.asset, &bake.report);
-    let verification = verify_asset(scene, asset);
-    let lights = WorldLights::new(scene, asset);
-    let checked = Checked::of(&verification);
-    let evidence = Evidence::new(scene, asset, &lights, &verification);
-    let error_end_m = pictures::error_end(&evidence);
     let surfaces = scene.triangle_surfaces();
+    let patches = patches(scene, &surfaces, asset.settings.lights);
+    let ground = Ground::new(scene, &patches);
+    let verification = check(scene, asset, &ground);
+    let lights = WorldLights::new(scene, asset);
+    let checked = Checked::of(&verification, report);
+    let evidence = Evidence::new(scene, asset, &lights, &ground, &verification);
+    let error_end_m = pictures::error_end(&evidence);
     let objects = objects::figures(&evidence, &surfaces, Grouping::Object);
     let parts = objects::figures(&evidence, &surfaces, Grouping::Part);
     let remedies = Remedies {
-        required_m: verification.required_m,
+        required_m: checked.required_m,
         more_lights: report.asked_lights.saturating_mul(2).min(MOST_LIGHTS),
         can_steer: objects.len() > 1,
     };
@@ -109,7 +110,7 @@ pub fn report_html(subjects: &Subjects) -> Result<String, ImageError> {
         error_end_m,
         visible_m2: checked.visible_m2,
         objects: object_tables(&objects, &parts),
-        tags: tables::tag_table(&evidence, &report.tags, &tag_cost::tag_costs(&evidence)),
+        tags: tables::tag_table(&evidence, &report.tags),
         sizes: tables::size_table(asset, subjects.file_bytes),
         times: tables::time_table(&report.seconds),
         notes: &report.notes,

@@ -164,7 +164,7 @@ fn add_surface(
     figures: &mut [ObjectFigures],
     sums: &mut [Sums],
 ) {
-    let (patches, scene) = (&evidence.verification.patches, evidence.scene);
+    let (patches, scene) = (evidence.patches, evidence.scene);
     for t in 0..patches.triangles.len() {
         let primitive = patches.region(t).primitive;
         let group = grouping.of(scene, primitive);

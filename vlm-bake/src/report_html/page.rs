@@ -168,8 +168,8 @@ const PLACES: &str = "The camera stands in front of the place (circle) and looks
 const OBJECTS: &str = "An object's lights should have the mean albedo of its surface, and return as much light as it under uniform \
     light: flux near 100 %. The rule allows 2 %. In each pair the left colour is the surface's, the right one the lights'.";
 
-const TAGS: &str = "Surface does not receive light from lights of its own tag. Light lost is the share of all light on the tagged \
-    surface that this takes away although it comes from elsewhere on the object, where everything is lit alike.";
+const TAGS: &str = "Surface does not receive light from lights of its own tag; a tag covers that surface. Light lost is the share of its \
+    lights' light that would have fallen there rightly, on parts for which the light does not stand, were nothing between.";
 
 fn section(id: &str, title: &str, explanation: &str, content: &Markup) -> Markup {
     html! { section id=(id) {

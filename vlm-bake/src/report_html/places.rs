@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use super::facts::Evidence;
-use super::stand_in::FindingKind;
+use crate::verify::{Finding, FindingKind};
 
 /// Places that are shown.
 const MOST: usize = 10;
@@ -26,8 +26,10 @@ pub enum Trouble {
     LightsItself,
     /// A light comes out on another side.
     PokesOut,
-    /// Nothing lies behind the surface, so its light cannot hide.
-    TooThin,
+    /// Both sides of the surface reflect, so its light cannot hide behind it.
+    Sheet,
+    /// The light is a sliver.
+    Sliver,
     /// No light stands for the surface.
     Uncovered,
     /// The light lies far from its surface.
@@ -96,11 +98,12 @@ fn merged(mut places: Vec<WorstPlace>, together: f64) -> Vec<WorstPlace> {
 }
 
 fn findings(evidence: &Evidence) -> Vec<WorstPlace> {
-    let place = |f: &super::stand_in::Finding| WorstPlace {
+    let place = |f: &Finding| WorstPlace {
         trouble: match f.kind {
+            FindingKind::TooThin => Trouble::Sliver,
+            _ if evidence.is_sheet(f.light) => Trouble::Sheet,
             FindingKind::LightsItself => Trouble::LightsItself,
             FindingKind::PokesOut => Trouble::PokesOut,
-            FindingKind::TooThin => Trouble::TooThin,
         },
         tagged: f.tagged,
         object: f.object.clone(),
@@ -121,7 +124,7 @@ fn material_of_light(evidence: &Evidence, light: u32) -> String {
 
 /// The paths of the object of a triangle of the patches, and its material's name.
 fn names_of(evidence: &Evidence, triangle: u32) -> (String, String) {
-    let primitive = evidence.verification.patches.region(triangle as usize).primitive;
+    let primitive = evidence.patches.region(triangle as usize).primitive;
     let object = evidence.scene.primitives[primitive as usize].object;
     (evidence.scene.objects[object as usize].path.clone(), evidence.material_name(primitive).to_owned())
 }
@@ -133,7 +136,7 @@ fn uncovered(evidence: &Evidence) -> Vec<WorstPlace> {
     for (p, light) in verification.light_of_point.iter().enumerate() {
         let point = &verification.points[p];
         if light.is_none() && point.area > 0.0 {
-            let region = verification.patches.triangle_region[point.triangle as usize];
+            let region = evidence.patches.triangle_region[point.triangle as usize];
             of_region.entry(region).or_default().push(p);
         }
     }

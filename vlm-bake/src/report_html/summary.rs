@@ -6,11 +6,12 @@ use super::objects::{ObjectFigures, percent};
 use super::places::{Trouble, WorstPlace};
 use super::text::{area, length, node, plural};
 use crate::report::Report;
+use crate::tag::TagReason;
 
 /// Uncovered surface up to this share passes without a word.
 const UNCOVERED: f64 = 0.01;
 
-/// Tagged lights up to this share of the lights' area pass without a word.
+/// Tags up to this share of the lights' area, and of the surface, pass without a word.
 const TAGGED: f64 = 0.03;
 
 /// The mean offset may be this many times the decimation error and the clearance together.
@@ -65,17 +66,18 @@ pub fn summary(
             ),
         ),
     };
-    let tagged = report.area.tagged_m2.max(0.0) / report.area.lights_m2.max(f64::MIN_POSITIVE);
     let hidden = match checked.open {
         0 => "Every one of them is hidden behind the surface that it stands for, or kept off it by a tag",
         _ => "The others are hidden behind the surface that they stand for, or kept off it by a tag",
     };
     let text = format!(
-        "{} stand for {} of surface. {hidden} ({} of the lights' area is tagged); {} of the surface has no light.",
+        "{} stand for {} of surface. {hidden}. {} of the lights' area carries a tag, {} of the surface is covered by tags; {} of the \
+         surface has no light.",
         plural(report.lights, "light", "lights"),
         area(checked.visible_m2),
-        percent(tagged),
-        percent(checked.uncovered()),
+        percent(checked.tagged),
+        percent(checked.covered_by_tags),
+        percent(checked.uncovered),
     );
     Summary { level, headline, text, changes }
 }
@@ -91,7 +93,7 @@ fn changes(
         open_lights(checked.open, places, remedies),
         uncovered(checked, objects, remedies),
         missing(objects),
-        tagged(report),
+        tagged(report, checked),
         budget(report),
         offset(report, checked),
     ];
@@ -99,7 +101,7 @@ fn changes(
 }
 
 fn open_lights(open: usize, places: &[WorstPlace], remedies: &Remedies) -> Option<String> {
-    let worst = places.iter().find(|p| !p.tagged && p.trouble <= Trouble::TooThin).filter(|_| open > 0)?;
+    let worst = places.iter().find(|p| !p.tagged && p.trouble <= Trouble::Sliver).filter(|_| open > 0)?;
     Some(format!(
         "{} at {}: see the first of the worst places. {}",
         worst.title(),
@@ -109,7 +111,7 @@ fn open_lights(open: usize, places: &[WorstPlace], remedies: &Remedies) -> Optio
 }
 
 fn uncovered(checked: &Checked, objects: &[ObjectFigures], remedies: &Remedies) -> Option<String> {
-    let share = checked.uncovered();
+    let share = checked.uncovered;
     let most = objects.iter().max_by(|a, b| a.uncovered_m2.total_cmp(&b.uncovered_m2))?;
     (share > UNCOVERED).then(|| {
         format!(
@@ -149,14 +151,21 @@ fn reflecting(object: &ObjectFigures) -> f64 {
     object.visible_m2 * f64::from(object.albedo.element_sum())
 }
 
-fn tagged(report: &Report) -> Option<String> {
-    let share = report.area.tagged_m2 / report.area.lights_m2.max(f64::MIN_POSITIVE);
-    let most = report.tags.iter().max_by(|a, b| a.area_m2.total_cmp(&b.area_m2))?;
-    (share > TAGGED).then(|| {
+fn tagged(report: &Report, checked: &Checked) -> Option<String> {
+    let most = report.tags.iter().max_by(|a, b| a.covers_m2.total_cmp(&b.covers_m2))?;
+    (checked.tagged.max(checked.covered_by_tags) > TAGGED).then(|| {
+        let remedy = match most.reason {
+            TagReason::Authored => "An artist asked for it",
+            TagReason::TwoSided => {
+                "If that is not meant to be a sheet, make it a closed solid and its material single-sided"
+            }
+            TagReason::Thin => "Make it thicker, or give it more lights",
+            TagReason::Uncleared => "Smooth or simplify its shape, or give it more lights",
+        };
         format!(
-            "{} of the lights' area is tagged and does not light surface of the same tag, most of it at {}. If that is not meant to be a \
-             sheet, make it a closed, single-sided solid.",
-            percent(share),
+            "{} of the lights' area carries a tag, and {} of the surface ignores them, most of it at {}. {remedy}.",
+            percent(checked.tagged),
+            percent(checked.covered_by_tags),
             node(&most.object)
         )
     })
@@ -187,7 +196,7 @@ fn offset(report: &Report, checked: &Checked) -> Option<String> {
 mod tests {
     use super::*;
     use crate::report::AreaReport;
-    use crate::report_html::stand_in::SelfLight;
+    use crate::verify::SelfLight;
 
     const REMEDIES: Remedies = Remedies { required_m: 1e-3, more_lights: 200, can_steer: true };
 
@@ -195,9 +204,12 @@ mod tests {
         open: 0,
         depth_m: 0.0,
         required_m: 1e-3,
+        samples: 1000,
         self_light: SelfLight { p999: 0.0, max: 0.0 },
         visible_m2: 10.0,
-        uncovered_m2: 0.0,
+        uncovered: 0.0,
+        tagged: 0.0,
+        covered_by_tags: 0.0,
     };
 
     fn report() -> Report {
@@ -218,7 +230,7 @@ mod tests {
     #[test]
     fn open_lights_are_bad_and_lost_light_is_worth_a_look() {
         assert_eq!(summary(&report(), &Checked { open: 1, ..CLEAN }, &[], &[], &REMEDIES).level, Level::Bad);
-        let lossy = Checked { uncovered_m2: 1.0, ..CLEAN };
+        let lossy = Checked { uncovered: 0.1, ..CLEAN };
         let objects =
             [ObjectFigures { path: "Room/Chair".to_owned(), uncovered_m2: 1.0, ..ObjectFigures::default() }];
         let lossy = summary(&report(), &lossy, &objects, &[], &REMEDIES);
