@@ -28,7 +28,7 @@ impl WorstPlace {
                 )
             }
             Trouble::PokesOut => {
-                format!("It shows on another side, or in front of its own: it would have to move by {by}.")
+                format!("It shows on another side, or in front of its own: it would have to move by up to {by}.")
             }
             Trouble::Sheet => format!(
                 "Both sides of this surface reflect, so whichever side a light lies on, it shines on the other. It would have to move by {by}."
@@ -53,15 +53,19 @@ impl WorstPlace {
         let thick = length(4.0 * remedies.required_m);
         let finer = remedies.finer(name);
         match (self.trouble, self.tagged) {
-            (Trouble::LightsItself | Trouble::PokesOut, true) => {
+            (Trouble::LightsItself, true) => format!(
                 "A tag already keeps this light off its own surface, so nothing shines through. To be rid of the tag, smooth or simplify the \
-                 shape here, or ask for more lights.".to_owned()
-            }
+                 shape here, or {finer}."
+            ),
+            (Trouble::PokesOut, true) => format!(
+                "A tag already keeps this light off the surface that it reaches, so nothing shines through. To be rid of the tag, make \
+                 {name} thicker here, or {finer}."
+            ),
             (Trouble::LightsItself, false) => {
                 format!("To mend it, {finer}. If it stays, set `extras.vlm.tag` on {name}.")
             }
             (Trouble::PokesOut, false) => format!(
-                "Make {name} at least {thick} thick here, or {finer}. If it stays, set `extras.vlm.tag` on it."
+                "Make {name} thicker here, or {finer}. If it stays, set `extras.vlm.tag` on it."
             ),
             (Trouble::Sheet, true) => format!(
                 "Fine as it is if {name} is meant to be a sheet: a tag keeps its lights off it. Otherwise close it into a solid at least \

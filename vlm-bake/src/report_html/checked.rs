@@ -1,15 +1,19 @@
 //! What the check of the lights found, in figures.
 
 use crate::report::Report;
-use crate::verify::{SelfLight, Verification};
+use crate::verify::{FindingKind, SelfLight, Verification};
 
-/// The check summed up. All but the first two is the bake's own.
+/// The check summed up. All but the lights that fail is the bake's own.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Checked {
     /// Lights that fail and that no tag keeps away.
     pub open: usize,
-    /// How far the worst of them would have to move, metres.
+    /// Of these, lights that light their own surface.
+    pub self_lighting: usize,
+    /// How much deeper the worst of those would have to lie, metres.
     pub depth_m: f64,
+    /// Lights that come out of their object.
+    pub out: usize,
     /// Required clearance, metres.
     pub required_m: f64,
     /// Surface points looked at.
@@ -30,10 +34,13 @@ impl Checked {
     /// Sums up.
     pub fn of(verification: &Verification, report: &Report) -> Self {
         let area = &report.area;
+        let of = |kind: FindingKind| verification.untagged().filter(move |f| f.kind == kind);
         let share = |part: f64, whole: f64| if whole > 0.0 { (part / whole).clamp(0.0, 1.0) } else { 0.0 };
         Self {
             open: verification.untagged().count(),
-            depth_m: verification.untagged().map(|f| f.depth_m).fold(0.0, f64::max),
+            self_lighting: of(FindingKind::LightsItself).count(),
+            depth_m: of(FindingKind::LightsItself).map(|f| f.depth_m).fold(0.0, f64::max),
+            out: of(FindingKind::PokesOut).count(),
             required_m: report.clearance.required_m,
             samples: report.clearance.samples,
             self_light: report.clearance.self_light,

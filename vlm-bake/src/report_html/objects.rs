@@ -165,24 +165,19 @@ fn add_surface(
     sums: &mut [Sums],
 ) {
     let (patches, scene) = (evidence.patches, evidence.scene);
-    for t in 0..patches.triangles.len() {
+    let verification = evidence.verification;
+    // By the check's points: surface that is buried in something solid has none, and is not seen.
+    for (point, light) in verification.points.iter().zip(&verification.light_of_point) {
+        let t = point.triangle as usize;
         let primitive = patches.region(t).primitive;
         let group = grouping.of(scene, primitive);
-        let sides = if patches.region(t).two_sided { 2.0 } else { 1.0 };
-        let area = sides * patches.area(t);
         let reflectance = surfaces[patches.triangle_source[t] as usize].reflectance();
         let steering = &scene.objects[scene.primitives[primitive as usize].object as usize].steering;
         let strength = steering.tint * steering.intensity;
-        figures[group].visible_m2 += area;
-        sums[group].albedo += reflectance.as_dvec3() * area;
-        sums[group].flux += (reflectance * strength).as_dvec3().element_sum() * area;
-    }
-    let verification = evidence.verification;
-    for (point, light) in verification.points.iter().zip(&verification.light_of_point) {
-        if light.is_none() {
-            let primitive = patches.region(point.triangle as usize).primitive;
-            figures[grouping.of(scene, primitive)].uncovered_m2 += point.area;
-        }
+        figures[group].visible_m2 += point.area;
+        figures[group].uncovered_m2 += if light.is_none() { point.area } else { 0.0 };
+        sums[group].albedo += reflectance.as_dvec3() * point.area;
+        sums[group].flux += (reflectance * strength).as_dvec3().element_sum() * point.area;
     }
 }
 

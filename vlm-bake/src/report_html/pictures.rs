@@ -177,8 +177,9 @@ pub fn error_end(evidence: &Evidence) -> f64 {
     // Every eighth point settles a percentile well enough.
     let mut beyond: Vec<f64> = pairs
         .step_by(8)
+        .filter(|(p, _)| p.area > 0.0)
         .filter_map(|(p, light)| {
-            let fact = evidence.light_fact((*light)? as usize, p.position, p.normal);
+            let fact = evidence.light_fact((*light)? as usize, p.inner(evidence.patches), p.normal);
             Some(fact.distance_m - verification.required_m)
         })
         .collect();

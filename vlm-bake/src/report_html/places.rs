@@ -169,8 +169,9 @@ fn far(evidence: &Evidence, error_end_m: f64) -> Vec<WorstPlace> {
     let least = error_end_m.max(4.0 * verification.required_m);
     let place = |(p, light): (usize, &Option<u32>)| {
         let point = &verification.points[p];
-        let light = (*light)?;
-        let fact = evidence.light_fact(light as usize, point.position, point.normal);
+        // Points without area are many at small triangles, and some are the lights' samples.
+        let light = (*light).filter(|_| point.area > 0.0)?;
+        let fact = evidence.light_fact(light as usize, point.inner(evidence.patches), point.normal);
         let amount = fact.distance_m - verification.required_m;
         (amount > least).then(|| names_of(evidence, point.triangle)).map(|(object, material)| WorstPlace {
             trouble: Trouble::Far,

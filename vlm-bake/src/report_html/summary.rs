@@ -202,7 +202,9 @@ mod tests {
 
     const CLEAN: Checked = Checked {
         open: 0,
+        self_lighting: 0,
         depth_m: 0.0,
+        out: 0,
         required_m: 1e-3,
         samples: 1000,
         self_light: SelfLight { p999: 0.0, max: 0.0 },
