@@ -152,7 +152,11 @@ mod tests {
                 ..BakedLight::default()
             };
             let lights = vec![light(0), light(1)];
-            Self { patches, lights, proof: Verification { points, light_of_point, ..Verification::default() } }
+            Self {
+                patches,
+                lights,
+                proof: Verification { points, light_of_point, ..Verification::default() },
+            }
         }
 
         fn lost(&self, tags: [u32; 4]) -> f64 {
@@ -179,7 +183,10 @@ mod tests {
         let half = plates.lost([7, 7, 7, 0]);
         assert!((half - 0.5 * OPPOSITE).abs() < 0.02, "half the plate, {half}");
         let covers = [[7; 4], [7, 7, 7, 0], [0; 4]].map(|tags| plates.measured(tags).covers_m2);
-        assert!((covers[0] - 2.0).abs() < 1e-3 && (covers[1] - 1.5).abs() < 1e-3 && covers[2] == 0.0, "{covers:?}");
+        assert!(
+            (covers[0] - 2.0).abs() < 1e-3 && (covers[1] - 1.5).abs() < 1e-3 && covers[2] == 0.0,
+            "{covers:?}"
+        );
     }
 
     #[test]

@@ -28,7 +28,9 @@ impl WorstPlace {
                 )
             }
             Trouble::PokesOut => {
-                format!("It shows on another side, or in front of its own: it would have to move by up to {by}.")
+                format!(
+                    "It shows on another side, or in front of its own: it would have to move by up to {by}."
+                )
             }
             Trouble::Sheet => format!(
                 "Both sides of this surface reflect, so whichever side a light lies on, it shines on the other. It would have to move by {by}."
@@ -51,7 +53,7 @@ impl WorstPlace {
     pub fn advice(&self, remedies: &Remedies) -> String {
         let name = node(&self.object);
         let thick = length(4.0 * remedies.required_m);
-        let finer = remedies.finer(name);
+        let (finer, last) = (remedies.finer(name), remedies.last_resort(name));
         match (self.trouble, self.tagged) {
             (Trouble::LightsItself, true) => format!(
                 "A tag already keeps this light off its own surface, so nothing shines through. To be rid of the tag, smooth or simplify the \
@@ -62,11 +64,11 @@ impl WorstPlace {
                  {name} thicker here, or {finer}."
             ),
             (Trouble::LightsItself, false) => {
-                format!("To mend it, {finer}. If it stays, set `extras.vlm.tag` on {name}.")
+                format!("To mend it, {finer}. {last}")
             }
-            (Trouble::PokesOut, false) => format!(
-                "Make {name} thicker here, or {finer}. If it stays, set `extras.vlm.tag` on it."
-            ),
+            (Trouble::PokesOut, false) => {
+                format!("Make {name} thicker here, or {finer}. {last}")
+            }
             (Trouble::Sheet, true) => format!(
                 "Fine as it is if {name} is meant to be a sheet: a tag keeps its lights off it. Otherwise close it into a solid at least \
                  {thick} thick, single-sided."
@@ -81,9 +83,9 @@ impl WorstPlace {
             (Trouble::Uncovered, _) => format!(
                 "If its light matters, {finer}, or join it to the surface that it touches. If not, leave it."
             ),
-            (Trouble::Far, _) => format!(
-                "Compare the pictures of the scene and of the lights; if the shape matters, {finer}."
-            ),
+            (Trouble::Far, _) => {
+                format!("Compare the pictures of the scene and of the lights; if the shape matters, {finer}.")
+            }
         }
     }
 }
@@ -100,6 +102,15 @@ pub struct Remedies {
 }
 
 impl Remedies {
+    /// What to do where nothing else helps. A tag on all of a scene would darken it.
+    fn last_resort(&self, name: &str) -> String {
+        if self.can_steer {
+            format!("If it stays, set `extras.vlm.tag` on {name}.")
+        } else {
+            "If it stays, make this part an object of its own and set `extras.vlm.tag` on it.".to_owned()
+        }
+    }
+
     /// How to get more lights onto an object.
     pub fn finer(&self, name: &str) -> String {
         let more = self.more_lights;
@@ -125,5 +136,6 @@ mod tests {
         assert_ne!(advice, WorstPlace { tagged: true, ..open.clone() }.advice(&several));
         let alone = open.advice(&Remedies { can_steer: false, ..several });
         assert!(!alone.contains("density"), "one object alone gains nothing by it: {alone}");
+        assert!(advice.contains("tag` on Wall") && alone.contains("object of its own"), "{alone}");
     }
 }

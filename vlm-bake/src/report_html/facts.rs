@@ -163,7 +163,13 @@ impl<'a> Evidence<'a> {
             }
             _ => LightFact::default(),
         };
-        Fact { point, facing, place, surface_tag: self.surface_tags.get(point.triangle as usize).copied().unwrap_or(0), light }
+        Fact {
+            point,
+            facing,
+            place,
+            surface_tag: self.surface_tags.get(point.triangle as usize).copied().unwrap_or(0),
+            light,
+        }
     }
 
     /// How a light lies behind a point.

@@ -21,10 +21,9 @@ pub fn caption(subject: Subject) -> (&'static str, &'static str) {
             "Clearance",
             "How deep the light lies behind the surface, over the depth required. Near 1 is best; yellow lies far too deep.",
         ),
-        Subject::Tags => (
-            "Tags",
-            "Surface and lights of one colour do not light each other. Hatched surface has no light at all.",
-        ),
+        Subject::Tags => {
+            ("Tags", "Surface in colour ignores lights of that colour. Hatched surface has no light at all.")
+        }
         Subject::Error => (
             "Decimation error",
             "How far the light is from the surface, beyond the clearance. Bright means that shape was simplified away.",
@@ -58,8 +57,9 @@ pub fn legend(subject: Subject, required_m: f64, error_end_m: f64) -> Markup {
         },
         Subject::Tags => html! {
             (swatch(PLAIN, "no tag"))
-            (swatch(of_tag(1), "tagged light"))
-            (swatch(pale(of_tag(1)), "tagged surface only"))
+            (swatch(of_tag(1), "surface and its light"))
+            (swatch(pale(of_tag(1)), "surface alone"))
+            (dotted("light alone"))
             (hatched("no light"))
             (swatch(MAKES_NONE, "makes none"))
         },
@@ -77,6 +77,12 @@ fn hatched(name: &str) -> Markup {
     let [light, dark] = [PLAIN, HATCH].map(css);
     let stripes = format!("background:repeating-linear-gradient(135deg,{light} 0 3px,{dark} 3px 5px)");
     html! { span.key { span.swatch style=(stripes) {} (name) } }
+}
+
+fn dotted(name: &str) -> Markup {
+    let [dot, ground] = [of_tag(1), PLAIN].map(css);
+    let dots = format!("background:{ground} radial-gradient({dot} 1.5px,transparent 2px) 0 0/5px 5px");
+    html! { span.key { span.swatch style=(dots) {} (name) } }
 }
 
 /// The ramp with labels at its ends and between.

@@ -151,6 +151,6 @@ fn close_up(evidence: &Evidence, place: WorstPlace) -> Result<CloseUp, ImageErro
         let [a, b, c] = evidence.lights.corners[light as usize].map(project);
         Some([a?, b?, c?])
     });
-    let picture = encode::data_uri(&pictures::draw_close(evidence, &view))?;
+    let picture = encode::data_uri(&pictures::draw_close(evidence, &view, &camera, place.light))?;
     Ok(CloseUp { mark: project(place.place), place, picture, outline })
 }

@@ -163,7 +163,8 @@ impl Page<'_> {
 }
 
 const PLACES: &str = "The camera stands in front of the place (circle) and looks straight at it. Outlined in yellow is the light in \
-    question, though it lies behind the surface; red is surface that its light reaches, blue is kept dark by a tag, hatched has no light.";
+    question, though it lies behind the surface; orange is what shows of it. Red is surface that its light reaches, blue is kept dark by a \
+    tag, hatched has no light.";
 
 const OBJECTS: &str = "An object's lights should have the mean albedo of its surface, and return as much light as it under uniform \
     light: flux near 100 %. The rule allows 2 %. In each pair the left colour is the surface's, the right one the lights'.";

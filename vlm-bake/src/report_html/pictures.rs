@@ -17,6 +17,9 @@ use crate::scene::Camera;
 /// The ramp of the clearance ends at this many times the required one.
 pub const CLEARANCE_END: f64 = 64.0;
 
+/// A light lies in front of the surface if it is nearer than this share of its distance.
+const IN_FRONT: f32 = 0.9995;
+
 /// What a picture shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Subject {
@@ -87,7 +90,7 @@ fn pixel(evidence: &Evidence, fact: &Fact, subject: Subject, at: [u32; 2], error
         },
         Subject::Clearance => measured(&|| of_clearance(fact, required_m)),
         Subject::Error => measured(&|| ramp((fact.light.distance_m - required_m) / error_end_m)),
-        Subject::Tags => measured(&|| of_tags(fact)),
+        Subject::Tags => measured(&|| of_tags(fact, at)),
         Subject::Violations => match fact.place {
             Place::MakesNone => lit(MAKES_NONE),
             _ => lit(of_violation(evidence, fact).unwrap_or(PLAIN)),
@@ -104,11 +107,20 @@ fn of_clearance(fact: &Fact, required_m: f64) -> [u8; 3] {
     ramp((fact.light.clearance_m / required_m).ln() / CLEARANCE_END.ln())
 }
 
-fn of_tags(fact: &Fact) -> [u8; 3] {
+/// The surface's tag; pale where its own light does not carry one, dots of the light's where the surface bears none.
+fn of_tags(fact: &Fact, [x, y]: [u32; 2]) -> [u8; 3] {
+    let is_dot = x % 4 < 2 && y % 4 < 2;
     match (fact.light.tag, fact.surface_tag) {
         (0, 0) => PLAIN,
         (0, surface) => pale(of_tag(surface)),
-        (light, _) => of_tag(light),
+        (light, 0) => {
+            if is_dot {
+                of_tag(light)
+            } else {
+                PLAIN
+            }
+        }
+        (_, surface) => of_tag(surface),
     }
 }
 
@@ -126,10 +138,22 @@ fn hatched([x, y]: [u32; 2], colour: [u8; 3]) -> [u8; 3] {
     if (x + y) % 7 < 2 { HATCH } else { colour }
 }
 
-/// A close-up: the scene greyed, so that red stands out.
-pub fn draw_close(evidence: &Evidence, view: &View) -> RgbImage {
+/// A close-up: the scene greyed, so that colours stand out, and the light where it lies in front of all surface.
+pub fn draw_close(evidence: &Evidence, view: &View, camera: &Camera, light: Option<u32>) -> RgbImage {
+    let corners: Vec<Vec3> =
+        light.map(|l| evidence.lights.corners[l as usize].map(|p| p.as_vec3()).to_vec()).unwrap_or_default();
+    let triangle: &[[u32; 3]] = if light.is_some() { &[[0, 1, 2]] } else { &[] };
+    let (bvh, rays) = (Bvh::new(&corners, triangle), CameraRays::new(camera, view.width, view.height));
+    let shows = |x: u32, y: u32, fact: Option<&Fact>| {
+        let ray = rays.through(x, y);
+        let end = fact.map_or(f32::INFINITY, |fact| IN_FRONT * fact.point.position.distance(ray.origin));
+        light.is_some() && bvh.hit(ray.origin, ray.direction, end).is_some()
+    };
     RgbImage::from_fn(view.width, view.height, |x, y| {
         let fact = view.facts[(y * view.width + x) as usize].as_ref();
+        if shows(x, y, fact) {
+            return Rgb(POKING);
+        }
         Rgb(fact.map_or(BACKGROUND, |fact| {
             let scene = shade_linear(fact.point.albedo.lerp(Vec3::splat(0.5), 0.6), fact.facing);
             match fact.place {

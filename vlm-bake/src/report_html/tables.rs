@@ -32,8 +32,7 @@ struct Reached {
 
 /// Asked against reached.
 pub fn asked_and_reached(report: &Report, checked: &Checked, objects: &[ObjectFigures]) -> Markup {
-    let rows =
-        [&bake_rows(report, checked.required_m)[..], &check_rows(checked, objects)[..]].concat();
+    let rows = [&bake_rows(report, checked.required_m)[..], &check_rows(checked, objects)[..]].concat();
     html! {
         div.scroll { table.reached {
             thead { tr { th {} th.n { "asked" } th.n { "reached" } th {} } }
@@ -87,7 +86,9 @@ fn bake_rows(report: &Report, required_m: f64) -> [Reached; 5] {
 /// Rows about what the check found.
 fn check_rows(checked: &Checked, objects: &[ObjectFigures]) -> [Reached; 7] {
     let missed = objects.iter().filter(|o| !o.why_missed().is_empty()).count();
-    let Checked { open: failing, depth_m, required_m, self_light, tagged, covered_by_tags, uncovered, .. } = *checked;
+    let Checked {
+        open: failing, depth_m, required_m, self_light, tagged, covered_by_tags, uncovered, ..
+    } = *checked;
     [
         Reached {
             what: "Lights that shine where they must not",

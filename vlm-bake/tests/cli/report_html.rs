@@ -11,6 +11,7 @@ use vlm_bake::options::{BakeOptions, Preset};
 use vlm_bake::progress::Silent;
 use vlm_bake::report_html::{Subjects, report_html};
 use vlm_bake::scene::{LoadOptions, Scene, load};
+use vlm_bake::verify::verify_asset;
 use vlm_format::GltfFile;
 
 use crate::support::{Document, Folders, repository, run, text, vlm};
@@ -56,6 +57,12 @@ fn red(image: &RgbImage) -> usize {
 fn section<'a>(page: &'a str, id: &str) -> &'a str {
     let start = page.find(&format!("<section id=\"{id}\"")).expect(id);
     page[start..].split("</section>").next().unwrap()
+}
+
+/// The figure that was reached in a row of the first table.
+fn reached<'a>(page: &'a str, row: &str) -> &'a str {
+    let row = section(page, "reached").split("<tr>").find(|tr| tr.contains(row)).expect(row);
+    row.split("<td class=\"n\">").nth(2).unwrap().split('<').next().unwrap()
 }
 
 /// True if the page holds something that a browser would fetch or run: a tag that we do not use, a handler, or an address outside the page.
@@ -149,6 +156,11 @@ fn a_light_pushed_out_of_its_wall_is_found_shown_and_named() {
     assert!(!clean.contains("Not fine"));
     assert_eq!(red(&picture(&clean, "Violations")), 0);
     assert!(section(&clean, "places").contains("None"));
+    assert_eq!(
+        verify_asset(&scene, &bake.asset).report(),
+        bake.report.clearance,
+        "the page shows the bake's own figures"
+    );
 
     // The first light that looks straight up is one of the floor, in the middle of the picture's lower half.
     let asset = &mut bake.asset;
@@ -162,6 +174,11 @@ fn a_light_pushed_out_of_its_wall_is_found_shown_and_named() {
     }
     let page = page(&scene, &bake);
     assert!(page.contains("Not fine"), "the verdict");
+    assert!(reached(&page, "Clearance").contains('-'), "the least depth");
+    assert!(
+        verify_asset(&scene, &bake.asset).self_light.max > 1e-4,
+        "its neighbours are tilted, and light themselves"
+    );
     assert!(red(&picture(&page, "Violations")) > 50, "the picture");
     let places = section(&page, "places");
     assert!(places.contains("A light lights its own surface") && places.contains("room"), "{places:.600}");
@@ -194,8 +211,16 @@ fn two_sided_sheets_are_listed_with_their_reason_and_cost() {
     let tags = section(&page, "tags");
     assert!(tags.contains("banner") && tags.contains("two-sided"), "{tags}");
     assert!(!page.contains("Not fine"), "tags mend sheets");
+    assert!(tags.contains("2.00 m²"), "both sides of a square metre: {tags}");
+    assert!(tags.contains("0 %"), "a flat sheet loses nothing: {tags}");
+    for share in ["Lights that carry a tag", "Surface covered by tags"] {
+        assert_ne!(reached(&page, share), "0 %", "{share}");
+    }
     let plain = page_of(&Document::room(), &["--lights", "200"]);
     assert!(!section(&plain, "tags").contains("two-sided"), "a plain room has none");
+    for share in ["Lights that carry a tag", "Surface covered by tags"] {
+        assert_eq!(reached(&plain, share), "0 %", "{share}");
+    }
 }
 
 #[test]
