@@ -53,14 +53,12 @@ fn budget() -> impl Strategy<Value = u32> {
 }
 
 #[test]
-#[should_panic(expected = "23 of 24 cases fail")] // missed yet: lights nearest to surface that decimation gave to another light
 fn noisy_balls() {
     let parameters = (any::<u64>(), 0.0..0.3f64, budget());
     for_all(&parameters, |&(seed, amplitude, lights)| is_clear(&random::noisy_ball(seed, amplitude), lights));
 }
 
 #[test]
-#[should_panic(expected = "1 of 24 cases fail")] // missed yet: 1 light of 1200 by 4.3 mm
 fn prisms() {
     let parameters = (any::<u64>(), 3..12u32, 0.05..0.9f64, 0.01..1.5f64, budget());
     for_all(&parameters, |&(seed, corners, least, height, lights)| {

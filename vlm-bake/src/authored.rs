@@ -141,6 +141,7 @@ impl AuthoredLights<'_> {
                 let surface = self.scene.albedo_at(triangle as usize, barycentric, area as f32);
                 let point = SurfacePoint {
                     position: position.as_dvec3(),
+                    inner: position.as_dvec3(),
                     normal: self.visible.normals[triangle as usize].as_dvec3(),
                     triangle,
                     barycentric,

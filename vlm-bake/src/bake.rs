@@ -15,17 +15,20 @@ use crate::flux::{conserve, steer};
 use crate::grid::grid;
 use crate::ground::Ground;
 use crate::mend::{Hidden, mend};
+use crate::neighbours::SmoothNeighbours;
 use crate::offset::Surroundings;
 use crate::options::BakeOptions;
 use crate::patches::{Patches, patches};
 use crate::progress::Progress;
 use crate::refine::{Refiner, Snap};
+use crate::render::triangle_tags;
 use crate::report::{AreaReport, DecimationReport, GridReport, OffsetReport, Report};
 use crate::samples::{BakedLight, Sources, samples};
 use crate::scene::Scene;
 use crate::slivers::MAX_ASPECT;
 use crate::surface::SurfacePoint;
 use crate::tag::{Accusation, TagReason, Tags, tag};
+use crate::tag_cost::measure;
 use crate::topology::aspect_ratio;
 use crate::verify::judge::{Evidence, Violation, verify};
 use crate::verify::{FindingKind, Verification, check};
@@ -89,27 +92,26 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let ground = Ground::new(scene, &patches);
     let coarse = mesh.lights();
     let points = ground.points(options.lights as usize);
-    let owners = Correspondence::new(&ground, &coarse, |_| true).of(&points);
-    let distance = measured_distance(&points, &owners.straight, &coarse);
+    let light_of_point = Correspondence::new(&ground, &coarse, |_| true).of(&points);
+    let distance = measured_distance(&points, &light_of_point, &coarse);
     let deepest = DEEPEST * (ground.clearance + distance.mean_m);
     let around = Surroundings { ground: &ground, points: &points, deepest };
     let snap = Snap::new(&patches);
-    let density = densities(scene, &patches, &mesh, &Standing::new(&owners, coarse.len()));
+    let density = densities(scene, &patches, &mesh, &Standing::new(&light_of_point, coarse.len()));
     let budget = (options.lights as usize).saturating_sub(authored::count(scene));
     let hidden = mend(Refiner::new(mesh, density, &snap), budget, &around);
 
     clock.stage("verify");
     let hidden = kept(scene, &ground, &points, hidden);
     let lights = &hidden.lights;
-    let owners = Correspondence::new(&ground, lights, |_| true).of(&points);
-    let standing = Standing::new(&owners, lights.len());
+    let light_of_point = Correspondence::new(&ground, lights, |_| true).of(&points);
+    let standing = Standing::new(&light_of_point, lights.len());
     let evidence = Evidence { ground: &ground, points: &points, standing: &standing };
     let violations = verify(lights, &evidence);
 
     clock.stage("samples");
     let accused = accusations(&patches, lights, violations);
     let group = &hidden.coarse;
-    let standing = Standing::straight(&owners, lights.len());
     let sources =
         Sources { scene, patches: &patches, group, accused: &accused, points: &points, standing: &standing };
     let mut baked = samples(&sources, lights, options.samples);
@@ -132,7 +134,8 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let grid_report = grid_report(grid.as_ref());
 
     clock.stage("tag");
-    let (asset, tags, proof) = tagged(scene, &mut baked, grid, options, &ground);
+    let (asset, mut tags, proof) = tagged(scene, &mut baked, grid, options, &ground);
+    measure(&patches, &baked, &triangle_tags(scene, &asset), &proof, &mut tags.reports);
 
     let mut report = Report {
         visible_triangles: scene.triangles.len(),
@@ -143,7 +146,7 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
         decimation: decimation_report(&decimation, distance),
         offset: offset_report(lights, &hidden.depths),
         clearance: proof.report(),
-        area: area_report(&points, &owners.straight, &baked, &tags),
+        area: area_report(&points, &light_of_point, &baked, &tags),
         flux,
         tags: tags.reports,
         grid: grid_report,
@@ -198,8 +201,8 @@ fn kept(scene: &Scene, ground: &Ground, points: &[SurfacePoint], hidden: Hidden)
         light.corners = as_stored(object.world_from_node, light.corners);
     });
     let shaped: Vec<bool> = lights.iter().map(|l| aspect_ratio(l.corners) <= MAX_ASPECT).collect();
-    let owners = Correspondence::new(ground, &lights, |l| shaped[l]).of(points);
-    let standing = Standing::straight(&owners, lights.len());
+    let light_of_point = Correspondence::new(ground, &lights, |l| shaped[l]).of(points);
+    let standing = Standing::new(&light_of_point, lights.len());
     let keep = |l: usize| shaped[l] && !standing.of(l).is_empty();
     let chosen: Vec<usize> = (0..lights.len()).filter(|&l| keep(l)).collect();
     Hidden {
@@ -212,9 +215,13 @@ fn kept(scene: &Scene, ground: &Ground, points: &[SurfacePoint], hidden: Hidden)
 /// What each light must not light.
 fn accusations(patches: &Patches, lights: &[Light], violations: Vec<Violation>) -> Vec<Option<Accusation>> {
     let mut accused: Vec<Option<Accusation>> = vec![None; lights.len()];
-    for violation in violations {
+    let neighbours = SmoothNeighbours::new(patches);
+    for mut violation in violations {
         let light = &lights[violation.light as usize];
         let two_sided = patches.regions[light.region as usize].two_sided;
+        if two_sided {
+            neighbours.widen(&mut violation.triangles);
+        }
         let triangles = violation.triangles.iter().flat_map(|&t| patches.scene_triangles(t)).collect();
         accused[violation.light as usize] =
             Some(Accusation { triangles, reason: reason(two_sided, violation.pokes_out) });

@@ -84,46 +84,29 @@ impl<'a> Correspondence<'a> {
         }
     }
 
-    /// The light that stands for a point, if one does, and the nearest if that is another: it must not light the point either.
+    /// The light that stands for a point, if one does.
     #[must_use]
-    pub fn lights_of(&self, point: &SurfacePoint) -> Option<(u32, Option<u32>)> {
+    pub fn light_of(&self, point: &SurfacePoint) -> Option<u32> {
         let own = self.patches.triangle_region[point.triangle as usize];
-        let position = point.inner(self.patches);
         let alike = |l: u32| {
             self.sides[l as usize] == point.back && self.normals[l as usize].dot(point.normal) > LEAST_COSINE
         };
-        let near = self.regions.closest(own, position, self.reach, alike)?;
+        let near = self.regions.closest(own, point.inner, self.reach, alike)?;
         if f64::from(near.distance) > self.sizes[near.triangle as usize] {
             return None;
         }
         let far = STRAIGHT_SHARE * f64::from(near.distance);
-        let along =
-            |direction: DVec3| self.regions.hit(own, position, direction, far, alike).map(|(light, _)| light);
-        let straight = along(-point.normal).or_else(|| along(point.normal)).unwrap_or(near.triangle);
-        Some((straight, Some(near.triangle).filter(|&nearest| nearest != straight)))
+        let along = |direction: DVec3| {
+            self.regions.hit(own, point.inner, direction, far, alike).map(|(light, _)| light)
+        };
+        along(-point.normal).or_else(|| along(point.normal)).or(Some(near.triangle))
     }
 
-    /// The lights of each point.
+    /// The light of each point.
     #[must_use]
-    pub fn of(&self, points: &[SurfacePoint]) -> Owners {
-        let (straight, nearest) = points
-            .par_iter()
-            .map(|point| match self.lights_of(point) {
-                Some((straight, nearest)) => (Some(straight), nearest),
-                None => (None, None),
-            })
-            .unzip();
-        Owners { straight, nearest }
+    pub fn of(&self, points: &[SurfacePoint]) -> Vec<Option<u32>> {
+        points.par_iter().map(|point| self.light_of(point)).collect()
     }
-}
-
-/// The lights of points.
-#[derive(Clone, Debug, Default)]
-pub struct Owners {
-    /// The light that stands for each point.
-    pub straight: Vec<Option<u32>>,
-    /// The nearest, where that is another.
-    pub nearest: Vec<Option<u32>>,
 }
 
 /// The numbers of the points for which each light stands, as offsets and a list.
@@ -134,21 +117,11 @@ pub struct Standing {
 }
 
 impl Standing {
-    /// The points that must be dark to each of so many lights.
+    /// Inverts [`Correspondence::of`] for that many lights.
     #[must_use]
-    pub fn new(owners: &Owners, lights: usize) -> Self {
-        Self::of_lists(&[&owners.straight, &owners.nearest], lights)
-    }
-
-    /// The points for which each light stands, so that each point is in one list at most.
-    #[must_use]
-    pub fn straight(owners: &Owners, lights: usize) -> Self {
-        Self::of_lists(&[&owners.straight], lights)
-    }
-
-    fn of_lists(lists: &[&[Option<u32>]], lights: usize) -> Self {
+    pub fn new(light_of_point: &[Option<u32>], lights: usize) -> Self {
         let mut starts = vec![0u32; lights + 1];
-        for light in lists.iter().copied().flatten().flatten() {
+        for light in light_of_point.iter().flatten() {
             starts[*light as usize + 1] += 1;
         }
         for l in 0..lights {
@@ -156,10 +129,9 @@ impl Standing {
         }
         let mut next = starts.clone();
         let mut points = vec![0; starts[lights] as usize];
-        let length = lists.iter().map(|list| list.len()).max().unwrap_or(0);
-        for point in 0..length {
-            for light in lists.iter().filter_map(|list| list.get(point).copied().flatten()) {
-                let slot = &mut next[light as usize];
+        for (point, light) in light_of_point.iter().enumerate() {
+            if let Some(light) = light {
+                let slot = &mut next[*light as usize];
                 points[*slot as usize] = point as u32;
                 *slot += 1;
             }

@@ -24,7 +24,9 @@ pub mod refine;
 pub mod offset;
 pub mod mend;
 pub mod verify;
+pub mod neighbours;
 pub mod tag;
+pub mod tag_cost;
 pub mod samples;
 pub mod flux;
 pub mod authored;
@@ -42,3 +44,5 @@ pub mod emitters;
 pub mod reference;
 pub mod render;
 pub mod picture;
+
+pub mod report_html;

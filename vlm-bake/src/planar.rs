@@ -15,6 +15,10 @@ const COPLANAR_SINE: f64 = 1e-3;
 /// A boundary vertex goes where the boundary bends by a smaller sine than this.
 const STRAIGHT_SINE: f64 = 1e-4;
 
+/// Vertices of a merged polygon are triangulated on a grid of so many steps over its extent: more than single precision rounds
+/// away, less than would let close ones fall together.
+const GRID: f64 = (1u32 << 20) as f64;
+
 /// A merged polygon must keep its area to this share, else its faces stay as they were.
 const AREA_TOLERANCE: f64 = 1e-6;
 
@@ -166,12 +170,19 @@ fn constrained(
     corners.dedup();
     let (u, v) = normal.any_orthonormal_pair();
     let origin = mesh.positions[*corners.first()? as usize];
+    // On a grid, so that rounding does not choose between two diagonals that are equally good: the same scene in another scale is
+    // triangulated alike.
+    let extent = corners
+        .iter()
+        .map(|&v| (mesh.positions[v as usize] - origin).abs().max_element())
+        .fold(0.0, f64::max);
+    let grid = |x: f64| (x / extent * GRID).round();
     let vertices: Vec<PlaneVertex> = corners
         .iter()
         .map(|&vertex| {
             let p = mesh.positions[vertex as usize] - origin;
             // any_orthonormal_pair gives u x v = normal, so counter-clockwise stays so.
-            let position = spade::mitigate_underflow(Point2::new(p.dot(u), p.dot(v)));
+            let position = spade::mitigate_underflow(Point2::new(grid(p.dot(u)), grid(p.dot(v))));
             PlaneVertex { position, vertex }
         })
         .collect();

@@ -32,7 +32,7 @@ const SNAP_COSINE: f64 = 0.7;
 const SNAP_ASPECT: f64 = 0.5 * MAX_ASPECT;
 
 /// Edges whose squared lengths differ by less than about this part of an octave count as equally long.
-const TIES: f64 = 1e6;
+const TIES: f64 = 1e3;
 
 /// An edge is walked to longer ones at most this often: ties and rounding must not make that endless.
 const LONGEST_WALK: usize = 64;

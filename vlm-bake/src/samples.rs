@@ -124,7 +124,7 @@ fn candidates<'a>(sources: &Sources<'a>, number: usize) -> Vec<Candidate<'a>> {
         let point = &sources.points[p as usize];
         let triangle = sources.patches.triangle_source[point.triangle as usize];
         let surface = sources.scene.albedo_at(triangle as usize, point.barycentric, point.area as f32);
-        let position = point.inner(sources.patches);
+        let position = point.inner;
         Candidate { point, position, albedo: surface.reflectance(), emission: surface.emission * PI }
     };
     sources.standing.of(number).iter().map(coloured).collect()

@@ -73,6 +73,7 @@ impl<'a> IslandDistance<'a> {
         let position = near.point.as_dvec3() + self.islands.origin();
         Some(SurfacePoint {
             position,
+            inner: position,
             normal: self.normals[near.triangle as usize],
             triangle: near.triangle,
             barycentric: barycentric(corners, position).as_vec3(),

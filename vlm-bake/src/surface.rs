@@ -12,6 +12,8 @@ use crate::topology::cross_of;
 pub struct SurfacePoint {
     /// World space, metres.
     pub position: DVec3,
+    /// Where the point looks for its light, and a sample would be: the same, or a little inside the triangle where it lies on an edge.
+    pub inner: DVec3,
     /// Unit geometric normal, on the side that reflects.
     pub normal: DVec3,
     /// Index into [`Patches::triangles`].
@@ -27,19 +29,18 @@ pub struct SurfacePoint {
 /// A point whose least barycentric weight is at most this lies on an edge of its triangle.
 const ON_EDGE: f32 = 1e-4;
 
-/// A point on an edge stands for the surface this share of the way to the middle of the triangle. Higher values leave the last bit of
-/// it to its neighbours; lower values take the neighbour's for its own.
+/// The inner place of a point on an edge lies at most this share of the way to the middle of its triangle.
 const INNER_SHARE: f64 = 0.1;
 
 impl SurfacePoint {
-    /// The place itself, or where it lies on an edge or vertex, at which several surfaces meet, a place a little inside its triangle.
-    #[must_use]
-    pub fn inner(&self, patches: &Patches) -> DVec3 {
+    /// Moves the inner place of a point on an edge or vertex, where several surfaces meet, into its triangle, by at most `most`
+    /// metres.
+    pub fn move_inside(&mut self, patches: &Patches, most: f64) {
         if self.barycentric.min_element() > ON_EDGE {
-            return self.position;
+            return;
         }
         let centre = patches.corners(self.triangle as usize).iter().sum::<DVec3>() / 3.0;
-        self.position.lerp(centre, INNER_SHARE)
+        self.inner = self.position + ((centre - self.position) * INNER_SHARE).clamp_length_max(most);
     }
 }
 
@@ -71,7 +72,15 @@ fn place(patches: &Patches, triangle: usize, index: u64, area: f64, points: &mut
     let (u, v) = fold(plastic(index));
     let position = a * (1.0 - u - v) + b * u + c * v;
     let barycentric = Vec3::new((1.0 - u - v) as f32, u as f32, v as f32);
-    let front = SurfacePoint { position, normal, triangle: triangle as u32, barycentric, area, back: false };
+    let front = SurfacePoint {
+        position,
+        inner: position,
+        normal,
+        triangle: triangle as u32,
+        barycentric,
+        area,
+        back: false,
+    };
     points.push(front);
     if patches.region(triangle).two_sided {
         points.push(SurfacePoint { normal: -normal, back: true, ..front });
@@ -104,8 +113,10 @@ pub fn spread_over([a, b, c]: [DVec3; 3], count: u32) -> impl Iterator<Item = DV
 pub fn centre_points(patches: &Patches, triangle: usize) -> Vec<SurfacePoint> {
     let corners = patches.corners(triangle);
     let Some(normal) = cross_of(corners).try_normalize() else { return Vec::new() };
+    let position = corners.iter().sum::<DVec3>() / 3.0;
     let front = SurfacePoint {
-        position: corners.iter().sum::<DVec3>() / 3.0,
+        position,
+        inner: position,
         normal,
         triangle: triangle as u32,
         barycentric: Vec3::splat(1.0 / 3.0),
@@ -133,6 +144,7 @@ pub fn feature_points(patches: &Patches) -> Vec<SurfacePoint> {
             (middle[side], middle[next]) = (0.5, 0.5);
             let bare = SurfacePoint {
                 position: corners[side],
+                inner: corners[side],
                 normal,
                 triangle: triangle as u32,
                 barycentric: corner,
@@ -141,7 +153,7 @@ pub fn feature_points(patches: &Patches) -> Vec<SurfacePoint> {
             };
             features.add(patches, (from, from), bare);
             let position = (corners[side] + corners[next]) / 2.0;
-            let middle = SurfacePoint { position, barycentric: middle, ..bare };
+            let middle = SurfacePoint { position, inner: position, barycentric: middle, ..bare };
             features.add(patches, (from.min(to), from.max(to)), middle);
         }
     }

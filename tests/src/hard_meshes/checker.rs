@@ -1,7 +1,7 @@
 //! Checks a bake from its asset and the visible triangles alone, by brute force; calls nothing of the code that it checks.
 //!
-//! Points are spread over every triangle. The light of a point is the nearest that looks its way (within 26 degrees), of those whose
-//! samples lie on the same connected part and primitive. A triangle that bears a light's tag never sees it.
+//! Points are spread over every triangle. The light of a point is, of those that look its way (within 26 degrees) and whose samples lie on
+//! the same connected part and primitive, the one straight behind it or else the nearest. A triangle that bears a light's tag never sees it.
 //! - A light *lights itself* where it comes nearer than the clearance to lighting a sample that it carries, or a point of which it is the
 //!   light. It *lights its triangle* where it lights any other point of a triangle on which its samples lie.
 //! - An untagged light *lies in front* where its place nearest to one of its samples is above that sample's horizon.
@@ -272,7 +272,7 @@ fn check_own_light(
     t: usize,
     verdict: &mut Verdict,
 ) {
-    let nearest = nearest_lights(lights, kin, x, surface.rounding);
+    let nearest = lights_at(lights, kin, (x, n), surface.rounding);
     verdict.covered += usize::from(!nearest.is_empty());
     let unshielded = |l: u32| !shields(surface, &lights[l as usize], t as u32);
     let lit = |&(l, _): &(u32, DVec3)| {
@@ -295,15 +295,28 @@ fn place_on([a, b, c]: Triangle, i: u32) -> DVec3 {
     a + (b - a) * u + (c - a) * v
 }
 
-/// The nearest lights with their nearest places; several if their distances differ by less than `slack`.
-fn nearest_lights(lights: &[Light], from: &[u32], x: DVec3, slack: f64) -> Vec<(u32, DVec3)> {
+/// The lights of a point with a place of each: the one straight behind, or straight before, where that is at most three times as far as
+/// the nearest; else the nearest, several if their distances differ by less than `slack`, and none if it is farther than its own size.
+fn lights_at(lights: &[Light], from: &[u32], (x, n): (DVec3, DVec3), slack: f64) -> Vec<(u32, DVec3)> {
     let places: Vec<(u32, DVec3, f64)> = from
         .iter()
         .map(|&l| (l, closest_on(lights[l as usize].corners, x)))
         .map(|(l, place)| (l, place, place.distance(x)))
         .collect();
-    let least = places.iter().map(|p| p.2).fold(f64::INFINITY, f64::min);
-    places.iter().filter(|p| p.2 <= least + slack).map(|&(l, place, _)| (l, place)).collect()
+    let Some(nearest) = places.iter().min_by(|a, b| a.2.total_cmp(&b.2)) else { return Vec::new() };
+    let [a, b, c] = lights[nearest.0 as usize].corners;
+    if nearest.2 > a.distance(b).max(b.distance(c)).max(c.distance(a)) {
+        return Vec::new();
+    }
+    for direction in [-n, n] {
+        let way = Segment::new(x, x + direction * (3.0 * nearest.2));
+        let met = from.iter().filter_map(|&l| Some((l, way.meets(lights[l as usize].corners)?)));
+        if let Some((l, share)) = met.min_by(|a, b| a.1.total_cmp(&b.1)) {
+            return vec![(l, x + way.direction * share)];
+        }
+    }
+    let near = places.iter().filter(|p| p.2 <= nearest.2 + slack);
+    near.map(|&(l, place, _)| (l, place)).collect()
 }
 
 /// Walks from just behind a surface point to a place of its light.

@@ -97,6 +97,33 @@ impl Scene {
         notes
     }
 
+    /// A camera outside that frames the scene's vertices along a diagonal, from the front right and above, in a picture of this
+    /// width over height.
+    pub(crate) fn overview(&self, aspect: f64) -> Camera {
+        let [minimum, maximum] = self.framed_box();
+        let (centre, backward) = (0.5 * (minimum + maximum).as_dvec3(), view_direction(Setting::Object));
+        let view = look(centre, backward);
+        let (right, up) = (view.x_axis.truncate(), view.y_axis.truncate());
+        let inside = |p: &&Vec3| p.cmpge(minimum).all() && p.cmple(maximum).all();
+        let middle = |axis: DVec3| {
+            let along = self.positions.iter().filter(inside).map(|p| (p.as_dvec3() - centre).dot(axis));
+            let [low, high] = along.fold([0.0_f64, 0.0_f64], |[low, high], x| [low.min(x), high.max(x)]);
+            0.5 * (low + high) * axis
+        };
+        let centre = centre + middle(right) + middle(up);
+        let needed = |p: &Vec3| {
+            let q = p.as_dvec3() - centre;
+            let across = (q.dot(right).abs() / aspect).max(q.dot(up).abs());
+            q.dot(backward) + across / (0.5 * f64::from(OUTSIDE_VIEW)).tan()
+        };
+        let distance = 1.05 * self.positions.iter().filter(inside).map(needed).fold(0.0, f64::max);
+        Camera {
+            name: String::from("overview"),
+            world_from_view: look(centre + distance * backward, backward),
+            projection: Projection::Perspective(OUTSIDE_VIEW),
+        }
+    }
+
     /// A light shines or a surface glows.
     fn is_lit(&self) -> bool {
         let glows =
@@ -263,7 +290,7 @@ fn view_direction(setting: Setting) -> DVec3 {
 }
 
 /// At `eye`, looking along `-backward`, upright.
-fn look(eye: DVec3, backward: DVec3) -> DMat4 {
+pub(crate) fn look(eye: DVec3, backward: DVec3) -> DMat4 {
     let right = DVec3::Y.cross(backward).try_normalize().unwrap_or(DVec3::X);
     let up = backward.cross(right);
     DMat4::from_cols(right.extend(0.0), up.extend(0.0), backward.extend(0.0), eye.extend(1.0))

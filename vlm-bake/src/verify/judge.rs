@@ -57,8 +57,9 @@ pub struct Evidence<'a> {
 }
 
 impl<'a> Evidence<'a> {
-    fn region(&self, light: &Light) -> &Region {
-        &self.ground.patches.regions[light.region as usize]
+    /// `None` for an authored light in a scene where nothing reflects.
+    fn region(&self, light: &Light) -> Option<&Region> {
+        self.ground.patches.regions.get(light.region as usize)
     }
 
     /// The surface points of a light.
@@ -78,10 +79,10 @@ pub fn verify(lights: &[Light], evidence: &Evidence) -> Vec<Violation> {
 pub fn judge(number: usize, light: &Light, evidence: &Evidence) -> Option<Violation> {
     let mut violation = Violation { light: number as u32, ..Violation::default() };
     lit_points(number, light, evidence, &mut violation);
-    if !evidence.region(light).two_sided {
-        lie_before(number, light, evidence, &mut violation);
+    lie_before(number, light, evidence, &mut violation);
+    if let Some(region) = evidence.region(light).filter(|region| !region.two_sided) {
         poke_between(number, light, evidence, &mut violation);
-        poke_beside(light, evidence, &mut violation);
+        poke_beside(light, region.island, evidence, &mut violation);
     }
     violation.triangles.sort_unstable();
     violation.triangles.dedup();
@@ -127,7 +128,7 @@ fn lie_before(number: usize, light: &Light, evidence: &Evidence, violation: &mut
 /// Looks for surface between a light's points and the light.
 fn poke_between(number: usize, light: &Light, evidence: &Evidence, violation: &mut Violation) {
     for point in evidence.own_points(number) {
-        let from = point.inner(evidence.ground.patches);
+        let from = point.inner;
         let corners = light.corners.map(|v| (v - from).as_vec3a());
         let way = Vec3::from(closest_point(&corners, Vec3A::ZERO)).as_dvec3();
         // A point behind its light lies in a recess that the light bridges; one beside it says nothing of what is behind itself.
@@ -169,10 +170,9 @@ fn leads_out(
 }
 
 /// Looks for places of a light that lie in front of its island, or into the open behind it.
-fn poke_beside(light: &Light, evidence: &Evidence, violation: &mut Violation) {
+fn poke_beside(light: &Light, island: u32, evidence: &Evidence, violation: &mut Violation) {
     let [a, b, c] = light.corners;
     let (normal, room) = (light.normal(), POKE_SHARE * evidence.ground.clearance);
-    let island = evidence.region(light).island;
     let distance = &evidence.ground.distance;
     for (i, place) in
         [a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0].into_iter().enumerate()
@@ -188,13 +188,7 @@ fn poke_beside(light: &Light, evidence: &Evidence, violation: &mut Violation) {
         // The nearest surface may be the far side of a fold: what looks the light's way tells whether that lies between.
         let Some(from) = distance.alike(place, island, normal, OTHER_SIDE_COSINE) else { continue };
         if (place - from.position).dot(from.normal) < 0.0
-            && leads_out(
-                &from,
-                from.inner(evidence.ground.patches),
-                place,
-                evidence,
-                &mut violation.triangles,
-            )
+            && leads_out(&from, from.inner, place, evidence, &mut violation.triangles)
         {
             violation.pokes_out = true;
             violation.note(place.distance(from.position), place);

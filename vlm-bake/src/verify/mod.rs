@@ -1,7 +1,7 @@
 //! Stage 7: proves that no light lights the surface for which it stands, and that none comes out on another side of its object.
 //! `docs/behind-the-geometry.md` has the definition in words.
 //!
-//! [`judge`] says what is wrong with a light; the baker uses it to mend and tag. [`verify_asset`] checks a finished asset
+//! [`mod@judge`] says what is wrong with a light; the baker uses it to mend and tag. [`verify_asset`] checks a finished asset
 //! against a scene, from nothing but what the file holds.
 
 pub mod judge;
@@ -140,13 +140,12 @@ pub fn check(scene: &Scene, asset: &VlmAsset, ground: &Ground) -> Verification {
     let lights: Vec<Light> = placed.iter().map(|p| p.light).collect();
     let mut points = ground.points(asset.settings.lights as usize);
     let derived = |l: usize| !placed[l].authored && placed[l].stands;
-    let mut owners = Correspondence::new(ground, &lights, derived).of(&points);
+    let mut light_of_point = Correspondence::new(ground, &lights, derived).of(&points);
     for (l, light) in placed.iter().enumerate() {
-        owners.straight.extend(light.samples.iter().map(|_| Some(l as u32)));
+        light_of_point.extend(light.samples.iter().map(|_| Some(l as u32)));
         points.extend(&light.samples);
     }
-    let standing = Standing::new(&owners, lights.len());
-    let light_of_point = owners.straight;
+    let standing = Standing::new(&light_of_point, lights.len());
     let evidence = Evidence { ground, points: &points, standing: &standing };
     let tags = ReceiverTags::new(scene, asset, ground.patches);
     let find = |l: usize| finding(scene, l, &placed[l], &evidence, &tags);
@@ -178,7 +177,7 @@ fn finding(
     }
     let violation = judge(number, light, evidence)?;
     // An artist may place a light in the open; it must only not light what it stands for.
-    if placed.authored && violation.points == 0 {
+    if (placed.authored || !placed.stands) && violation.points == 0 {
         return None;
     }
     let Violation { points, depth, place, triangles, .. } = violation;
@@ -308,6 +307,7 @@ impl<'a> SurfaceSearch<'a> {
         let corners = self.patches.corners(near.triangle as usize);
         Some(SurfacePoint {
             position,
+            inner: position,
             normal: if back { -own } else { own },
             triangle: near.triangle,
             barycentric: crate::topology::barycentric(corners, position).as_vec3(),

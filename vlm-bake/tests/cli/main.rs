@@ -7,4 +7,5 @@ mod bad_input;
 mod baking;
 mod authored;
 mod commands;
+mod report_html;
 mod geometry;

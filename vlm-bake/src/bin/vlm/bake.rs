@@ -9,6 +9,7 @@ use vlm_bake::picture::write_png;
 use vlm_bake::progress::Progress;
 use vlm_bake::render::{Method, RenderOptions, render};
 use vlm_bake::report::Report;
+use vlm_bake::report_html::{Subjects, report_html};
 use vlm_bake::scene::{LoadOptions, Scene, load};
 use vlm_format::{GltfFile, OutputFile, write_file, write_vlm};
 
@@ -40,6 +41,9 @@ pub struct BakeArgs {
     /// Write what was made as JSON
     #[arg(long, value_name = "FILE.json")]
     report: Option<PathBuf>,
+    /// Write a page with pictures, tables and the worst places, to be looked at in a browser
+    #[arg(long, value_name = "FILE.html")]
+    report_html: Option<PathBuf>,
     /// Render a picture lit by the baked lights, from the file's first camera
     #[arg(long, value_name = "FILE.png")]
     preview: Option<PathBuf>,
@@ -80,7 +84,7 @@ fn positive(text: &str) -> Result<f32, String> {
 pub fn run(args: &BakeArgs) -> Result<(), CliError> {
     let bars = Bars::new();
     let target = target(&args.output)?;
-    let named = [Some(&args.output), args.report.as_ref(), args.preview.as_ref()];
+    let named = [Some(&args.output), args.report.as_ref(), args.report_html.as_ref(), args.preview.as_ref()];
     named.into_iter().flatten().try_for_each(|path| check_folder(path))?;
 
     bars.begin("read", 1);
@@ -95,6 +99,10 @@ pub fn run(args: &BakeArgs) -> Result<(), CliError> {
     deliver(&args.output, &outputs)?;
     if let Some(path) = &args.report {
         write_report(path, &baked.report)?;
+    }
+    if let Some(path) = &args.report_html {
+        bars.begin("page", 1);
+        write_page(path, args, &scene, &baked, &outputs)?;
     }
     let preview = args.preview.as_deref().map(|path| preview(path, &scene, &baked, &bars)).transpose()?;
     drop(bars);
@@ -133,6 +141,22 @@ fn write_report(path: &Path, report: &Report) -> Result<(), CliError> {
     };
     let json = serde_json::to_string_pretty(report).map_err(|e| broken(&e))?;
     Ok(write_file(path, (json + "\n").as_bytes())?)
+}
+
+/// Writes the page of `--report-html`; it is named for the input.
+fn write_page(
+    path: &Path,
+    args: &BakeArgs,
+    scene: &Scene,
+    bake: &Bake,
+    outputs: &[OutputFile],
+) -> Result<(), CliError> {
+    let title = if is_pipe(&args.input) { None } else { args.input.file_name() };
+    let title = title.map_or_else(|| "standard input".into(), |name| name.to_string_lossy());
+    let file_bytes = outputs.iter().map(|output| output.bytes.len() as u64).sum();
+    let page = report_html(&Subjects { title: &title, scene, bake, file_bytes })
+        .map_err(|e| CliError::usage(format!("{}: the page was not written: {e}", path.display())))?;
+    Ok(write_file(path, page.as_bytes())?)
 }
 
 /// Renders the preview; returns lines that say what it shows.

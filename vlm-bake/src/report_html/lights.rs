@@ -1,0 +1,54 @@
+//! The lights of an asset in world space.
+
+use glam::DVec3;
+use vlm_format::VlmAsset;
+
+use crate::scene::Scene;
+use crate::topology::cross_of;
+
+/// One element per light of the asset.
+pub struct WorldLights {
+    /// Counter-clockwise seen from the emitting side, metres.
+    pub corners: Vec<[DVec3; 3]>,
+    /// Unit normals on the emitting side; zero for a light without area.
+    pub normals: Vec<DVec3>,
+    /// Index into [`Scene::objects`]; `None` if the scene lacks the node.
+    pub objects: Vec<Option<u32>>,
+    /// Made by an artist.
+    pub authored: Vec<bool>,
+}
+
+impl WorldLights {
+    /// Moves the lights into world space.
+    pub fn new(scene: &Scene, asset: &VlmAsset) -> Self {
+        let count = asset.triangles.len();
+        let mut lights = Self {
+            corners: vec![[DVec3::ZERO; 3]; count],
+            normals: vec![DVec3::ZERO; count],
+            objects: vec![None; count],
+            authored: vec![false; count],
+        };
+        for vlm in &asset.vlms {
+            let object = scene.objects.iter().position(|o| o.node == vlm.node);
+            let world_from_node = object.map(|o| scene.objects[o].world_from_node).unwrap_or_default();
+            let mirrored = world_from_node.determinant() < 0.0;
+            for l in (vlm.lights[0] as usize..).take(vlm.lights[1] as usize).take_while(|&l| l < count) {
+                let node = asset.triangles[l].map(|v| asset.positions[v as usize].as_dvec3());
+                let mut corners = node.map(|p| world_from_node.transform_point3(p));
+                if mirrored {
+                    corners.swap(1, 2);
+                }
+                lights.corners[l] = corners;
+                lights.normals[l] = cross_of(corners).normalize_or_zero();
+                lights.objects[l] = object.map(|o| o as u32);
+                lights.authored[l] = vlm.authored;
+            }
+        }
+        lights
+    }
+
+    /// Area of a light, square metres.
+    pub fn area(&self, light: usize) -> f64 {
+        0.5 * cross_of(self.corners[light]).length()
+    }
+}

@@ -1,0 +1,302 @@
+//! The page's tables.
+
+use std::collections::BTreeMap;
+
+use maud::{Markup, html};
+use vlm_format::VlmAsset;
+
+use super::checked::Checked;
+use super::colour::{css, encode, of_tag};
+use super::facts::Evidence;
+use super::objects::{ALLOWED, ObjectFigures, percent};
+use super::text::{area, bytes, count, length};
+use crate::report::Report;
+use crate::tag::{TagReason, TagReport};
+
+/// Rows of a table that are shown; the rest is summed up. More make a longer page.
+const MOST_ROWS: usize = 40;
+
+/// The share of the mean irradiance that surface may receive from its own region.
+const MOST_SELF_LIGHT: f64 = 1e-4;
+
+/// A row of the first table.
+#[derive(Clone, Default)]
+struct Reached {
+    what: &'static str,
+    /// Empty where nothing was asked; then `good` says nothing.
+    asked: String,
+    reached: String,
+    good: bool,
+    note: String,
+}
+
+/// Asked against reached.
+pub fn asked_and_reached(report: &Report, checked: &Checked, objects: &[ObjectFigures]) -> Markup {
+    let rows = [&bake_rows(report, checked.required_m)[..], &check_rows(checked, objects)[..]].concat();
+    html! {
+        div.scroll { table.reached {
+            thead { tr { th {} th.n { "asked" } th.n { "reached" } th {} } }
+            tbody { @for row in rows {
+                tr {
+                    th scope="row" { (row.what) @if !row.note.is_empty() { span.note { (row.note) } } }
+                    td.n { (row.asked) } td.n { (row.reached) }
+                    td { @if row.asked.is_empty() {} @else if row.good { span.ok { "ok" } } @else { span.miss { "look" } } }
+                }
+            } }
+        } }
+    }
+}
+
+/// Rows about what the bake made.
+fn bake_rows(report: &Report, required_m: f64) -> [Reached; 5] {
+    let offset_limit = 1.5 * (report.decimation.error_m + required_m);
+    let (asked, reached) = (report.decimation.asked as u64, report.decimation.reached as u64);
+    [
+        Reached {
+            what: "Lights",
+            asked: count(report.asked_lights.into()),
+            reached: count(report.lights as u64),
+            good: report.missed_because.is_empty(),
+            note: report.missed_because.clone(),
+        },
+        Reached {
+            what: "Faces after decimation",
+            asked: format!("about {}", count(asked)),
+            reached: count(reached),
+            good: reached <= asked || report.missed_because.is_empty(),
+            note: "the rest of the lights divides large faces".to_owned(),
+        },
+        Reached {
+            what: "Decimation error",
+            reached: length(report.decimation.error_m),
+            note: "distance at the worst collapse".to_owned(),
+            ..Reached::default()
+        },
+        Reached {
+            what: "Mean offset",
+            asked: format!("≤ {}", length(offset_limit)),
+            reached: length(report.offset.mean_m),
+            good: report.offset.mean_m <= offset_limit,
+            note: "at most 1.5 × (decimation error + clearance)".to_owned(),
+        },
+        Reached { what: "Greatest offset", reached: length(report.offset.max_m), ..Reached::default() },
+    ]
+}
+
+/// Rows about what the check found.
+fn check_rows(checked: &Checked, objects: &[ObjectFigures]) -> [Reached; 7] {
+    let missed = objects.iter().filter(|o| !o.why_missed().is_empty()).count();
+    let Checked {
+        open: failing, depth_m, required_m, self_light, tagged, covered_by_tags, uncovered, ..
+    } = *checked;
+    [
+        Reached {
+            what: "Lights that shine where they must not",
+            asked: "0".to_owned(),
+            reached: count(failing as u64),
+            good: failing == 0,
+            note: format!(
+                "neither mended nor tagged: {} on their own surface, {} out of their object; {} points looked at",
+                count(checked.self_lighting as u64),
+                count(checked.out as u64),
+                count(checked.samples)
+            ),
+        },
+        Reached {
+            what: "Clearance",
+            asked: format!("≥ {}", length(required_m)),
+            reached: format!("{}{}", if depth_m > 0.0 { "" } else { "≥ " }, length(required_m - depth_m)),
+            good: depth_m <= 0.0,
+            note: "least depth behind the surface, where no tag helps".to_owned(),
+        },
+        Reached {
+            what: "Light of surface on itself",
+            asked: format!("≤ {}", percent(MOST_SELF_LIGHT)),
+            reached: percent(self_light.p999),
+            good: self_light.p999 <= MOST_SELF_LIGHT,
+            note: format!(
+                "from lights that stand for it, of the mean irradiance, all lights alike: what 99.9 % of the surface stays below; at most {}",
+                percent(self_light.max)
+            ),
+        },
+        Reached {
+            what: "Lights that carry a tag",
+            asked: "≤ 3 %".to_owned(),
+            reached: percent(tagged),
+            good: tagged <= 0.03,
+            note: "of the lights' area; sheets are tagged whole".to_owned(),
+        },
+        Reached {
+            what: "Surface covered by tags",
+            asked: "≤ 3 %".to_owned(),
+            reached: percent(covered_by_tags),
+            good: covered_by_tags <= 0.03,
+            note: "of the surface that reflects: it ignores the lights of its tag".to_owned(),
+        },
+        Reached {
+            what: "Surface without light",
+            asked: "≤ 1 %".to_owned(),
+            reached: percent(uncovered),
+            good: uncovered <= 0.01,
+            note: "of the surface that reflects".to_owned(),
+        },
+        Reached {
+            what: "Objects off by more than 2 %",
+            asked: "0".to_owned(),
+            reached: count(missed as u64),
+            good: missed == 0,
+            note: "in albedo or flux, see below".to_owned(),
+        },
+    ]
+}
+
+/// Albedo and flux per object or part, which `what` names; those that miss the rule come first, the largest first.
+pub fn object_table(what: &str, objects: &[ObjectFigures]) -> Markup {
+    let mut order: Vec<&ObjectFigures> = objects.iter().collect();
+    order.sort_by(|a, b| {
+        let missed = |o: &ObjectFigures| !o.why_missed().is_empty();
+        missed(b).cmp(&missed(a)).then(b.visible_m2.total_cmp(&a.visible_m2))
+    });
+    let rest = order.len().saturating_sub(MOST_ROWS);
+    html! {
+        div.scroll { table {
+            thead { tr {
+                th { (what) } th.n { "lights" } th.n { "surface" } th.n { "without light" } th.n { "area of lights" }
+                th { "albedo" } th.n { "off by" } th.n { "flux" }
+            } }
+            tbody { @for o in order.iter().take(MOST_ROWS) { (object_row(o)) } }
+        } }
+        @if rest > 0 { p.rest { (count(rest as u64)) " more, smaller or within the rule." } }
+    }
+}
+
+fn object_row(o: &ObjectFigures) -> Markup {
+    let why = o.why_missed();
+    let off = |share: f64| if share.abs() > ALLOWED { "n off" } else { "n" };
+    let swatches = [o.albedo, o.light_albedo].map(|albedo| css(encode(albedo)));
+    html! {
+        tr {
+            th.path scope="row" { (path(&o.path)) @if !why.is_empty() { span.note { (why) } } }
+            td.n { (count((o.lights + o.authored) as u64)) }
+            td.n { (area(o.visible_m2)) }
+            td.n { (percent(o.uncovered_m2 / o.visible_m2.max(f64::MIN_POSITIVE))) }
+            td.n { (area(o.lights_m2)) }
+            td { span.pair {
+                span style={ "background:" (swatches[0]) } title="surface" {}
+                span style={ "background:" (swatches[1]) } title="lights" {}
+            } }
+            td class=(off(o.albedo_error())) { (percent(o.albedo_error())) }
+            td class=(off(o.flux_ratio - 1.0)) { (percent(o.flux_ratio)) }
+        }
+    }
+}
+
+/// The tags, those first that cover most.
+pub fn tag_table(evidence: &Evidence, tags: &[TagReport]) -> Markup {
+    if tags.is_empty() {
+        return html! { p { "None: every light is hidden behind its surface." } };
+    }
+    let mut order: Vec<&TagReport> = tags.iter().collect();
+    order.sort_by(|a, b| b.covers_m2.total_cmp(&a.covers_m2).then(a.tag.cmp(&b.tag)));
+    let rest = order.len().saturating_sub(MOST_ROWS);
+    html! {
+        div.scroll { table {
+            thead { tr {
+                th.n { "tag" } th { "object" } th { "material, mesh / primitive" } th { "reason" } th.n { "lights" } th.n { "their area" }
+                th.n { "covers" } th.n { "light lost" }
+            } }
+            tbody { @for t in order.iter().take(MOST_ROWS) {
+                tr {
+                    td.n { span.swatch style={ "background:" (css(of_tag(t.tag))) } {} (t.tag) }
+                    th.path scope="row" { (path(&t.object)) }
+                    td { (material(evidence, t)) ", " (t.mesh) " / " (t.primitive) }
+                    td { (reason(t.reason)) }
+                    td.n { (count(t.lights as u64)) }
+                    td.n { (area(t.area_m2)) }
+                    td.n { (area(t.covers_m2)) }
+                    td.n { (percent(t.light_lost)) }
+                }
+            } }
+        } }
+        @if rest > 0 { p.rest { (count(rest as u64)) " more tags, smaller ones." } }
+    }
+}
+
+/// The name of the material of a tagged primitive.
+fn material<'a>(evidence: &'a Evidence, tag: &TagReport) -> &'a str {
+    let primitives = &evidence.scene.primitives;
+    let found = primitives.iter().position(|p| (p.mesh, p.primitive) == (tag.mesh, tag.primitive));
+    found.map_or("", |p| evidence.material_name(p as u32))
+}
+
+fn reason(reason: TagReason) -> &'static str {
+    match reason {
+        TagReason::Authored => "set by the artist",
+        TagReason::TwoSided => "two-sided: nothing lies behind it",
+        TagReason::Thin => "too thin: the lights would come out on another side",
+        TagReason::Uncleared => "folded or bent more than the lights can follow",
+    }
+}
+
+/// A node path that may break behind its slashes.
+pub fn path(path: &str) -> Markup {
+    let shown = if path.is_empty() { "scene" } else { path };
+    html! { @for (i, part) in shown.split('/').enumerate() { @if i > 0 { "/" wbr; } (part) } }
+}
+
+/// What the asset adds to the file, by part.
+pub fn size_table(asset: &VlmAsset, file_bytes: u64) -> Markup {
+    let parts = sizes(asset);
+    let sum: u64 = parts.iter().map(|(_, size)| size).sum();
+    html! {
+        div.scroll { table.narrow {
+            thead { tr { th { "part" } th.n { "size" } th.n { "share of the file" } } }
+            tbody {
+                @for (part, size) in &parts {
+                    tr { th scope="row" { (part) } td.n { (bytes(*size)) } td.n { (percent(share(*size, file_bytes))) } }
+                }
+                tr.sum { th scope="row" { "all arrays of the VLM" } td.n { (bytes(sum)) } td.n { (percent(share(sum, file_bytes))) } }
+                tr { th scope="row" { "the file" } td.n { (bytes(file_bytes)) } td.n {} }
+            }
+        } }
+    }
+}
+
+fn share(part: u64, whole: u64) -> f64 {
+    part as f64 / whole.max(1) as f64
+}
+
+/// Four bytes a number, as `vlm-format` writes them.
+fn sizes(asset: &VlmAsset) -> [(&'static str, u64); 4] {
+    let numbers = |vectors: usize, integers: usize| 4 * (3 * vectors + integers) as u64;
+    let lights = numbers(asset.positions.len() + asset.triangles.len(), 0);
+    let colours = numbers(asset.albedo.len() + asset.emission.len(), asset.tags.len());
+    let samples = numbers(3 * asset.samples.len(), asset.sample_starts.len());
+    let grid =
+        asset.grid.as_ref().map_or(0, |g| numbers(0, g.cells.len() + g.starts.len() + g.entries.len()));
+    [
+        ("lights: geometry", lights),
+        ("lights: colours and tags", colours),
+        ("samples", samples),
+        ("grid", grid),
+    ]
+}
+
+/// Seconds by stage, in alphabetical order, as bars.
+pub fn time_table(seconds: &BTreeMap<&'static str, f64>) -> Markup {
+    let sum: f64 = seconds.values().sum();
+    html! {
+        div.scroll { table.narrow {
+            thead { tr { th { "stage" } th.n { "seconds" } th {} } }
+            tbody {
+                @for (stage, s) in seconds {
+                    tr {
+                        th scope="row" { (stage) } td.n { (format!("{s:.2}")) }
+                        td.bars { span.bar style=(format!("width:{:.1}%", 100.0 * s / sum.max(f64::MIN_POSITIVE))) {} }
+                    }
+                }
+                tr.sum { th scope="row" { "all" } td.n { (format!("{sum:.2}")) } td {} }
+            }
+        } }
+    }
+}
