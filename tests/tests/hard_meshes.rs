@@ -176,7 +176,7 @@ fn a_power_of_two_changes_nothing_else() {
     assert!(difference(&one, &other, 1.9).is_ok_and(|d| d > 0.01), "the negative control");
 }
 
-/// Scaled by a power of ten, coordinates round differently; what is flat comes out the same within that rounding.
+/// Scaled by a power of ten, coordinates round differently; what is flat comes out with as many lights, as far behind, and nearly where they were.
 #[test]
 fn a_power_of_ten_changes_rounding_alone() {
     let one = baked(&solids::flat_room(), 400).1;
@@ -184,7 +184,8 @@ fn a_power_of_ten_changes_rounding_alone() {
         let other = baked(&solids::flat_room().scaled(factor), 400).1;
         difference(&one, &other, factor)
     });
-    assert!(differences.iter().all(|d| d.as_ref().is_ok_and(|d| *d < 1e-5)), "{differences:?}");
+    // A wall's diagonal may lie the other way: where two are equally good, rounding chooses.
+    assert!(differences.iter().all(|d| d.as_ref().is_ok_and(|d| *d < 0.05)), "{differences:?}");
 }
 
 /// What is curved may be decimated another way where rounding decides between two collapses: to as many lights, as far behind, with

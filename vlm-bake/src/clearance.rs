@@ -33,3 +33,16 @@ pub fn self_lighting(light: &[DVec3; 3], normal: DVec3, point: &SurfacePoint, cl
     let before = (point.position - light[0]).dot(normal);
     rise(light, point).min(before) + clearance
 }
+
+/// True if a light lights a place with that normal, or comes nearer to that than the clearance.
+#[must_use]
+pub fn lights_place(
+    light: &[DVec3; 3],
+    light_normal: DVec3,
+    place: DVec3,
+    normal: DVec3,
+    clearance: f64,
+) -> bool {
+    let rise = light.iter().map(|v| (*v - place).dot(normal)).fold(f64::NEG_INFINITY, f64::max);
+    rise.min((place - light[0]).dot(light_normal)) + clearance > 0.0
+}

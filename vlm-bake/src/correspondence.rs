@@ -17,7 +17,7 @@ use crate::topology::cross_of;
 /// A light stands only for points whose normal is at most this far (cosine) from its own. Lower values let a light stand
 /// for the side walls of what was decimated away, which it can never clear; higher values leave more of the surface without
 /// a light.
-const LEAST_COSINE: f64 = 0.9;
+pub const LEAST_COSINE: f64 = 0.9;
 
 /// The light straight behind a point counts where it is at most this many times as far away as the nearest. Higher values find
 /// the far side of a hollow; lower values give the surface beside a sharp edge to the light across it.

@@ -31,6 +31,8 @@ pub struct Ground<'a> {
     pub distance: IslandDistance<'a>,
     /// Ways out of objects, through all that is visible.
     pub way_out: WayOut,
+    /// The triangles around each vertex of the patches.
+    pub around: VertexTriangles,
     /// Required distance of a light behind its surface, metres.
     pub clearance: f64,
     /// A light stands for surface at most this far away, metres.
@@ -46,6 +48,7 @@ impl<'a> Ground<'a> {
             patches,
             distance: IslandDistance::new(patches),
             way_out: WayOut::new(scene, patches),
+            around: VertexTriangles::new(patches),
             clearance: required_clearance(bounds),
             reach: REACH_SHARE * (bounds[1] - bounds[0]).max_element(),
         }
@@ -62,6 +65,40 @@ impl<'a> Ground<'a> {
         let most = INNER_CLEARANCES * self.clearance;
         points.par_iter_mut().for_each(|point| point.move_inside(self.patches, most));
         points
+    }
+}
+
+/// The triangles around each vertex, as offsets and a list.
+pub struct VertexTriangles {
+    starts: Vec<u32>,
+    triangles: Vec<u32>,
+}
+
+impl VertexTriangles {
+    fn new(patches: &Patches) -> Self {
+        let mut starts = vec![0u32; patches.positions.len() + 1];
+        for &v in patches.triangles.as_flattened() {
+            starts[v as usize + 1] += 1;
+        }
+        for v in 1..starts.len() {
+            starts[v] += starts[v - 1];
+        }
+        let mut next = starts.clone();
+        let mut triangles = vec![0; patches.triangles.len() * 3];
+        for (t, corners) in patches.triangles.iter().enumerate() {
+            for &v in corners {
+                triangles[next[v as usize] as usize] = t as u32;
+                next[v as usize] += 1;
+            }
+        }
+        Self { starts, triangles }
+    }
+
+    /// Those around a vertex, ascending.
+    #[must_use]
+    pub fn of(&self, vertex: u32) -> &[u32] {
+        let v = vertex as usize;
+        &self.triangles[self.starts[v] as usize..self.starts[v + 1] as usize]
     }
 }
 

@@ -13,11 +13,12 @@ use glam::{DVec3, Vec3, Vec3A};
 use rayon::prelude::*;
 
 use crate::bvh::nearest::closest_point;
-use crate::clearance::self_lighting;
-use crate::correspondence::{Light, Standing};
+use crate::clearance::{lights_place, self_lighting};
+use crate::correspondence::{LEAST_COSINE, Light, Standing};
 use crate::ground::Ground;
 use crate::patches::Region;
 use crate::surface::SurfacePoint;
+use crate::topology::cross_of;
 
 /// A light comes out of its island when it lies less than this share of the clearance behind it: a mitred vertex at a sharp edge
 /// may be nearer to the edge than to either face.
@@ -109,6 +110,27 @@ fn lit_points(number: usize, light: &Light, evidence: &Evidence, violation: &mut
             violation.note(depth, point.position);
         }
     }
+    lit_corners(light, evidence, &mut violation.triangles);
+}
+
+/// Adds the triangles that meet those at a corner at which the light lights them too: no point may lie just there.
+fn lit_corners(light: &Light, evidence: &Evidence, triangles: &mut Vec<u32>) {
+    let (ground, normal) = (evidence.ground, light.normal());
+    let patches = ground.patches;
+    let mut beside = Vec::new();
+    for &t in triangles.iter() {
+        for v in patches.triangles[t as usize] {
+            let place = patches.positions[v as usize];
+            beside.extend(ground.around.of(v).iter().copied().filter(|&other| {
+                let n = cross_of(patches.corners(other as usize)).normalize_or_zero();
+                let side = if light.back { -n } else { n };
+                patches.triangle_region[other as usize] == light.region
+                    && side.dot(normal) > LEAST_COSINE
+                    && lights_place(&light.corners, normal, place, side, ground.clearance)
+            }));
+        }
+    }
+    triangles.extend(beside);
 }
 
 /// A light may bridge recesses, but not lie before all that it stands for.
