@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use glam::{DVec3, Vec3A};
-use rayon::prelude::*;
 use vlm_format::{Grid, VlmAsset};
 
 use crate::authored;
@@ -14,32 +13,26 @@ use crate::decimate::{Decimation, LightMesh, decimate};
 use crate::flux::{conserve, steer};
 use crate::grid::grid;
 use crate::ground::Ground;
-use crate::mend::{Hidden, mend};
-use crate::neighbours::SmoothNeighbours;
+use crate::mend::{kept, mend};
 use crate::offset::Surroundings;
 use crate::options::BakeOptions;
 use crate::patches::{Patches, patches};
 use crate::progress::Progress;
+use crate::prove::{accusations, prove};
 use crate::refine::{Refiner, Snap};
-use crate::render::triangle_tags;
 use crate::report::{AreaReport, DecimationReport, GridReport, OffsetReport, Report};
 use crate::samples::{BakedLight, Sources, samples};
 use crate::scene::Scene;
 use crate::slivers::MAX_ASPECT;
 use crate::surface::SurfacePoint;
-use crate::tag::{Accusation, TagReason, Tags, tag};
-use crate::tag_cost::measure;
+use crate::tag::Tags;
 use crate::topology::aspect_ratio;
-use crate::verify::judge::{Evidence, Violation, verify};
-use crate::verify::{FindingKind, Verification, check};
-use crate::write::{as_stored, assemble, order, placeable};
+use crate::verify::judge::{Evidence, verify};
+use crate::write::{order, placeable};
 
 /// Lights sink by at most this many times the clearance and the mean distance between faces and their surface together. Higher values
 /// hide more lights behind bumpy surface instead of tagging them, and put all of them deeper there, where they fit their surface less.
 const DEEPEST: f64 = 12.0;
-
-/// The finished asset is proven at most so often: each time, what it finds is tagged.
-const PROOFS: usize = 4;
 
 /// An asset and how it came about.
 #[derive(Clone, Debug, Default)]
@@ -134,8 +127,7 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let grid_report = grid_report(grid.as_ref());
 
     clock.stage("tag");
-    let (asset, mut tags, proof) = tagged(scene, &mut baked, grid, options, &ground);
-    measure(&patches, &baked, &triangle_tags(scene, &asset), &proof, &mut tags.reports);
+    let (asset, tags, proof) = prove(scene, &mut baked, grid.as_ref(), options, &ground);
 
     let mut report = Report {
         visible_triangles: scene.triangles.len(),
@@ -156,85 +148,6 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     report.missed_because = why_missed(&report, options);
     report.seconds = clock.finish();
     Ok(Bake { asset, report })
-}
-
-/// Tags the lights, assembles the asset and proves it. Where the proof finds what the check of the stages before it did not, from no more
-/// than the file holds, that is tagged too.
-fn tagged(
-    scene: &Scene,
-    baked: &mut [BakedLight],
-    grid: Option<Grid>,
-    options: &BakeOptions,
-    ground: &Ground,
-) -> (VlmAsset, Tags, Verification) {
-    let mut round = 0;
-    loop {
-        let tags = tag(scene, ground.patches, baked);
-        let asset = assemble(scene, baked, &tags, grid.clone(), options);
-        let proof = check(scene, &asset, ground);
-        round += 1;
-        if round == PROOFS || proof.untagged().next().is_none() {
-            return (asset, tags, proof);
-        }
-        for finding in proof.untagged() {
-            let light = &mut baked[finding.light as usize];
-            let accused = light.accused.get_or_insert_with(|| Accusation {
-                triangles: Vec::new(),
-                reason: reason(false, finding.kind == FindingKind::PokesOut),
-            });
-            accused
-                .triangles
-                .extend(finding.triangles.iter().map(|&t| ground.patches.triangle_source[t as usize]));
-            accused.triangles.sort_unstable();
-            accused.triangles.dedup();
-        }
-    }
-}
-
-/// The lights as the file will hold them, rounded to single precision in the space of their node, without those that would be too thin
-/// or stand for no surface.
-fn kept(scene: &Scene, ground: &Ground, points: &[SurfacePoint], hidden: Hidden) -> Hidden {
-    let Hidden { mut lights, coarse, depths } = hidden;
-    lights.par_iter_mut().for_each(|light| {
-        let primitive = ground.patches.regions[light.region as usize].primitive;
-        let object = &scene.objects[scene.primitives[primitive as usize].object as usize];
-        light.corners = as_stored(object.world_from_node, light.corners);
-    });
-    let shaped: Vec<bool> = lights.iter().map(|l| aspect_ratio(l.corners) <= MAX_ASPECT).collect();
-    let light_of_point = Correspondence::new(ground, &lights, |l| shaped[l]).of(points);
-    let standing = Standing::new(&light_of_point, lights.len());
-    let keep = |l: usize| shaped[l] && !standing.of(l).is_empty();
-    let chosen: Vec<usize> = (0..lights.len()).filter(|&l| keep(l)).collect();
-    Hidden {
-        lights: chosen.iter().map(|&l| lights[l]).collect(),
-        coarse: chosen.iter().map(|&l| coarse[l]).collect(),
-        depths: chosen.iter().map(|&l| depths[l]).collect(),
-    }
-}
-
-/// What each light must not light.
-fn accusations(patches: &Patches, lights: &[Light], violations: Vec<Violation>) -> Vec<Option<Accusation>> {
-    let mut accused: Vec<Option<Accusation>> = vec![None; lights.len()];
-    let neighbours = SmoothNeighbours::new(patches);
-    for mut violation in violations {
-        let light = &lights[violation.light as usize];
-        let two_sided = patches.regions[light.region as usize].two_sided;
-        if two_sided {
-            neighbours.widen(&mut violation.triangles);
-        }
-        let triangles = violation.triangles.iter().flat_map(|&t| patches.scene_triangles(t)).collect();
-        accused[violation.light as usize] =
-            Some(Accusation { triangles, reason: reason(two_sided, violation.pokes_out) });
-    }
-    accused
-}
-
-fn reason(two_sided: bool, pokes_out: bool) -> TagReason {
-    match (two_sided, pokes_out) {
-        (true, _) => TagReason::TwoSided,
-        (false, true) => TagReason::Thin,
-        (false, false) => TagReason::Uncleared,
-    }
 }
 
 fn authored_lights(lights: &[BakedLight]) -> usize {

@@ -1,7 +1,7 @@
 //! Bakes Virtual Light Meshes from glTF, and renders them on the CPU.
 //!
 //! Stages of the bake, in the order in which data flows:
-//! `scene -> patches -> decimate -> refine, offset, mend -> verify -> tag -> samples -> authored -> grid -> write`.
+//! `scene -> patches -> decimate -> refine, offset, mend -> verify -> samples, flux -> authored -> grid -> tag, prove -> write`.
 //! For pictures on the CPU: `scene, bvh -> camera -> shade -> gbuffer -> reference | render -> picture`.
 
 pub mod options;
@@ -24,13 +24,14 @@ pub mod refine;
 pub mod offset;
 pub mod mend;
 pub mod verify;
-pub mod neighbours;
-pub mod tag;
-pub mod tag_cost;
 pub mod samples;
 pub mod flux;
 pub mod authored;
 pub mod grid;
+pub mod neighbours;
+pub mod tag;
+pub mod tag_cost;
+pub mod prove;
 pub mod write;
 
 pub mod bvh;

@@ -10,12 +10,15 @@ use rayon::prelude::*;
 use crate::clearance::rise;
 use crate::correspondence::{Correspondence, Light, Standing};
 use crate::decimate::LightMesh;
+use crate::ground::Ground;
 use crate::offset::{Surroundings, offset};
 use crate::refine::Refiner;
+use crate::scene::Scene;
 use crate::slivers::MAX_ASPECT;
 use crate::surface::SurfacePoint;
 use crate::topology::aspect_ratio;
 use crate::verify::judge::{Evidence, Violation, judge, verify};
+use crate::write::as_stored;
 
 /// Share of the budget that is kept for lights that fail. Higher values leave fewer of them, and larger lights everywhere else.
 const MENDING_SHARE: f64 = 0.2;
@@ -91,6 +94,28 @@ fn thinned(points: &[SurfacePoint], budget: usize) -> Vec<SurfacePoint> {
     let enough = (ROUGH_POINTS_PER_LIGHT * budget).max(LEAST_ROUGH_POINTS);
     // An odd step, since the two sides of two-sided surfaces take turns.
     points.iter().step_by(points.len().div_ceil(enough) | 1).copied().collect()
+}
+
+/// The lights as the file will hold them, rounded to single precision in the space of their node, without those that would be too thin
+/// or stand for no surface.
+#[must_use]
+pub fn kept(scene: &Scene, ground: &Ground, points: &[SurfacePoint], hidden: Hidden) -> Hidden {
+    let Hidden { mut lights, coarse, depths } = hidden;
+    lights.par_iter_mut().for_each(|light| {
+        let primitive = ground.patches.regions[light.region as usize].primitive;
+        let object = &scene.objects[scene.primitives[primitive as usize].object as usize];
+        light.corners = as_stored(object.world_from_node, light.corners);
+    });
+    let shaped: Vec<bool> = lights.iter().map(|l| aspect_ratio(l.corners) <= MAX_ASPECT).collect();
+    let light_of_point = Correspondence::new(ground, &lights, |l| shaped[l]).of(points);
+    let standing = Standing::new(&light_of_point, lights.len());
+    let keep = |l: usize| shaped[l] && !standing.of(l).is_empty();
+    let chosen: Vec<usize> = (0..lights.len()).filter(|&l| keep(l)).collect();
+    Hidden {
+        lights: chosen.iter().map(|&l| lights[l]).collect(),
+        coarse: chosen.iter().map(|&l| coarse[l]).collect(),
+        depths: chosen.iter().map(|&l| depths[l]).collect(),
+    }
 }
 
 /// The mesh with its vertices where they hide best, and which faces make lights there.

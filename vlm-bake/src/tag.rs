@@ -1,4 +1,4 @@
-//! Stage 8: ids for the lights that cannot hide. A receiver is never lit by a light of its own tag.
+//! Stage 10: ids for the lights that cannot hide. A receiver is never lit by a light of its own tag.
 //!
 //! A tag covers as little as it can: the triangles that a light would light wrongly, and no others, so that a two-sided banner
 //! still lights the wall beside it though both are one primitive. Lights and such triangles form a graph, and each of its connected

@@ -1,4 +1,4 @@
-//! Stage 10: the finished lights as a [`VlmAsset`], in the spaces of their nodes.
+//! Stage 12: the finished lights as a [`VlmAsset`], in the spaces of their nodes.
 
 use glam::{DMat3, DMat4, DVec3, Vec3};
 use rustc_hash::FxHashMap;

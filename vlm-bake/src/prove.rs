@@ -1,0 +1,84 @@
+//! Stage 11: tags the lights, assembles the asset, and proves it by what the file will hold.
+
+use vlm_format::{Grid, VlmAsset};
+
+use crate::correspondence::Light;
+use crate::ground::Ground;
+use crate::neighbours::SmoothNeighbours;
+use crate::options::BakeOptions;
+use crate::patches::Patches;
+use crate::render::triangle_tags;
+use crate::samples::BakedLight;
+use crate::scene::Scene;
+use crate::tag::{Accusation, TagReason, Tags, tag};
+use crate::tag_cost::measure;
+use crate::verify::judge::Violation;
+use crate::verify::{FindingKind, Verification, check};
+use crate::write::assemble;
+
+/// The finished asset is proven at most so often: each time, what it finds is tagged.
+const PROOFS: usize = 4;
+
+/// What each light must not light.
+#[must_use]
+pub fn accusations(
+    patches: &Patches,
+    lights: &[Light],
+    violations: Vec<Violation>,
+) -> Vec<Option<Accusation>> {
+    let mut accused: Vec<Option<Accusation>> = vec![None; lights.len()];
+    let neighbours = SmoothNeighbours::new(patches);
+    for mut violation in violations {
+        let light = &lights[violation.light as usize];
+        let two_sided = patches.regions[light.region as usize].two_sided;
+        if two_sided {
+            neighbours.widen(&mut violation.triangles);
+        }
+        let triangles = violation.triangles.iter().flat_map(|&t| patches.scene_triangles(t)).collect();
+        accused[violation.light as usize] =
+            Some(Accusation { triangles, reason: reason(two_sided, violation.pokes_out) });
+    }
+    accused
+}
+
+fn reason(two_sided: bool, pokes_out: bool) -> TagReason {
+    match (two_sided, pokes_out) {
+        (true, _) => TagReason::TwoSided,
+        (false, true) => TagReason::Thin,
+        (false, false) => TagReason::Uncleared,
+    }
+}
+
+/// Tags the lights, assembles the asset and proves it. Where the proof finds what the check of the stages before it did not, from no more
+/// than the file holds, that is tagged too.
+pub fn prove(
+    scene: &Scene,
+    baked: &mut [BakedLight],
+    grid: Option<&Grid>,
+    options: &BakeOptions,
+    ground: &Ground,
+) -> (VlmAsset, Tags, Verification) {
+    let mut round = 0;
+    loop {
+        let mut tags = tag(scene, ground.patches, baked);
+        let asset = assemble(scene, baked, &tags, grid.cloned(), options);
+        let proof = check(scene, &asset, ground);
+        round += 1;
+        if round == PROOFS || proof.untagged().next().is_none() {
+            measure(ground.patches, baked, &triangle_tags(scene, &asset), &proof, &mut tags.reports);
+            return (asset, tags, proof);
+        }
+        for finding in proof.untagged() {
+            let light = &mut baked[finding.light as usize];
+            let accused = light.accused.get_or_insert_with(|| Accusation {
+                triangles: Vec::new(),
+                reason: reason(false, finding.kind == FindingKind::PokesOut),
+            });
+            accused
+                .triangles
+                .extend(finding.triangles.iter().map(|&t| ground.patches.triangle_source[t as usize]));
+            accused.triangles.sort_unstable();
+            accused.triangles.dedup();
+        }
+    }
+}
