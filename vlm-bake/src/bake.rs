@@ -32,7 +32,7 @@ use crate::write::{order, placeable};
 
 /// Lights sink by at most this many times the clearance and the mean distance between faces and their surface together. Higher values
 /// hide more lights behind bumpy surface instead of tagging them, and put all of them deeper there, where they fit their surface less.
-const DEEPEST: f64 = 12.0;
+const DEEPEST: f64 = 16.0;
 
 /// An asset and how it came about.
 #[derive(Clone, Debug, Default)]
@@ -104,9 +104,15 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
 
     clock.stage("samples");
     let accused = accusations(&patches, lights, violations);
-    let group = &hidden.coarse;
-    let sources =
-        Sources { scene, patches: &patches, group, accused: &accused, points: &points, standing: &standing };
+    let sources = Sources {
+        scene,
+        patches: &patches,
+        group: &hidden.coarse,
+        rest_areas: &hidden.rest_areas,
+        accused: &accused,
+        points: &points,
+        standing: &standing,
+    };
     let mut baked = samples(&sources, lights, options.samples);
     let flux = conserve(scene, &patches, &surfaces, &points, &mut baked);
     steer(scene, &mut baked);

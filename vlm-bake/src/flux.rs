@@ -3,6 +3,9 @@
 //! Under uniform irradiance a surface sends out `sum of area x albedo` per irradiance, its reflecting area; its lights send out
 //! `sum of area x reflectance`. What decimation dropped, and what no light stands for, is missing from the second. So the lights of
 //! each object are scaled, channel by channel, until the two agree; likewise what they emit by themselves.
+//!
+//! The lights of a hollow grow as they move behind its wall. Whoever stands in it sees the wall at the same solid angle at any
+//! depth, so there it is the radiosity that must stay, and the reflecting area may grow as the lights do.
 
 use std::f32::consts::PI;
 
@@ -18,6 +21,9 @@ use crate::topology::cross_of;
 /// Lights are scaled by at most this factor, up or down: beyond it, what is left would be a hot spot in place of much that was dropped.
 /// What is cut off is lost, and reported.
 const MOST_SCALING: f64 = 4.0;
+
+/// The reflecting area of a hollow may grow by at most this factor.
+const MOST_GROWTH: f64 = 1.1;
 
 /// Light that an object sends out may differ by this share before the report names it.
 pub const TOLERANCE: f64 = 0.02;
@@ -47,6 +53,8 @@ pub struct ObjectFlux {
 #[derive(Clone, Copy, Default)]
 struct Sent {
     area: f64,
+    /// Of lights, before they moved.
+    rest_area: f64,
     reflected: DVec3,
     emitted: DVec3,
 }
@@ -71,9 +79,11 @@ pub fn conserve(
     };
     for light in lights.iter_mut() {
         let (visible, before) = (&visible[light.object as usize], &before[light.object as usize]);
-        let reflected = scale(visible.reflected, before.reflected);
+        let growth = if before.rest_area > 0.0 { before.area / before.rest_area } else { 1.0 };
+        let growth = growth.clamp(1.0, MOST_GROWTH);
+        let reflected = scale(visible.reflected * growth, before.reflected);
         light.samples.iter_mut().for_each(|s| s.reflectance *= reflected);
-        light.emission *= scale(visible.emitted, before.emitted);
+        light.emission *= scale(visible.emitted * growth, before.emitted);
     }
     let after = sent_by_lights(scene, lights);
     let objects = visible.iter().zip(after).enumerate().filter(|(_, (visible, _))| visible.area > 0.0);
@@ -121,6 +131,7 @@ fn sent_by_lights(scene: &Scene, lights: &[BakedLight]) -> Vec<Sent> {
         let area = 0.5 * cross_of(light.corners).length();
         let to = &mut sent[light.object as usize];
         to.area += area;
+        to.rest_area += light.rest_area;
         to.reflected += light.samples.iter().map(|s| s.reflectance.as_dvec3()).sum::<DVec3>() * area;
         to.emitted += light.emission.as_dvec3() * area;
     }

@@ -42,6 +42,7 @@ const SINK_SHARE: f64 = 0.4;
 const MARGIN: f64 = 1.05;
 
 /// Lights that hide as far as they can.
+#[derive(Clone, Debug, Default)]
 pub struct Hidden {
     /// The lights in place.
     pub lights: Vec<Light>,
@@ -49,6 +50,8 @@ pub struct Hidden {
     pub coarse: Vec<u32>,
     /// How far each lies from its place of rest along its normal, metres.
     pub depths: Vec<f64>,
+    /// The area of each at rest, square metres.
+    pub rest_areas: Vec<f64>,
 }
 
 /// Refines to the budget and hides the lights.
@@ -100,7 +103,7 @@ fn thinned(points: &[SurfacePoint], budget: usize) -> Vec<SurfacePoint> {
 /// or stand for no surface.
 #[must_use]
 pub fn kept(scene: &Scene, ground: &Ground, points: &[SurfacePoint], hidden: Hidden) -> Hidden {
-    let Hidden { mut lights, coarse, depths } = hidden;
+    let Hidden { mut lights, coarse, depths, rest_areas } = hidden;
     lights.par_iter_mut().for_each(|light| {
         let primitive = ground.patches.regions[light.region as usize].primitive;
         let object = &scene.objects[scene.primitives[primitive as usize].object as usize];
@@ -115,6 +118,7 @@ pub fn kept(scene: &Scene, ground: &Ground, points: &[SurfacePoint], hidden: Hid
         lights: chosen.iter().map(|&l| lights[l]).collect(),
         coarse: chosen.iter().map(|&l| coarse[l]).collect(),
         depths: chosen.iter().map(|&l| depths[l]).collect(),
+        rest_areas: chosen.iter().map(|&l| rest_areas[l]).collect(),
     }
 }
 
@@ -183,7 +187,7 @@ fn shrunk(number: u32, lights: &[Light], evidence: &Evidence, deepest: f64) -> O
 
 /// The lights of the faces that emit.
 fn collect(refiner: &Refiner, lights: Vec<Light>, emits: &[bool]) -> Hidden {
-    let mut hidden = Hidden { lights: Vec::new(), coarse: Vec::new(), depths: Vec::new() };
+    let mut hidden = Hidden::default();
     for (f, light) in lights.into_iter().enumerate() {
         if !emits[f] {
             continue;
@@ -191,6 +195,7 @@ fn collect(refiner: &Refiner, lights: Vec<Light>, emits: &[bool]) -> Hidden {
         let centre = |corners: [DVec3; 3]| corners.iter().sum::<DVec3>() / 3.0;
         let moved = centre(refiner.mesh.corners(f)) - centre(light.corners);
         hidden.depths.push(moved.dot(light.normal()));
+        hidden.rest_areas.push(refiner.mesh.area(f));
         hidden.coarse.push(refiner.mesh.faces[f].coarse);
         hidden.lights.push(light);
     }

@@ -37,6 +37,8 @@ pub struct BakedLight {
     pub emission: Vec3,
     /// 0 for none.
     pub tag: u32,
+    /// Its area before it moved behind its surface, square metres; 0 for authored ones.
+    pub rest_area: f64,
     /// What it must not light, if anything.
     pub accused: Option<Accusation>,
     /// Made by an artist.
@@ -74,6 +76,8 @@ pub struct Sources<'a> {
     pub patches: &'a Patches,
     /// Per light, a number that it shares with the lights of its neighbourhood: parts of one face of the decimated mesh.
     pub group: &'a [u32],
+    /// Per light, its area before it moved behind its surface, square metres.
+    pub rest_areas: &'a [f64],
     /// Per light, what it must not light.
     pub accused: &'a [Option<Accusation>],
     /// Points on the visible surface.
@@ -113,7 +117,8 @@ fn finish_light(
     let region = sources.patches.regions[light.region as usize];
     let object = sources.scene.primitives[region.primitive as usize].object;
     let accused = sources.accused[number].clone();
-    let bare = BakedLight { corners: light.corners, object, accused, ..BakedLight::default() };
+    let rest_area = sources.rest_areas[number];
+    let bare = BakedLight { corners: light.corners, object, rest_area, accused, ..BakedLight::default() };
     let finished = colour(bare, &candidates, ratio, count);
     (!finished.samples.is_empty() || finished.emission != Vec3::ZERO).then_some(finished)
 }
