@@ -25,3 +25,4 @@ pub mod hard_meshes;
 pub mod text;
 pub mod grid_bench;
 pub mod bake_bench;
+pub mod clearance_bench;

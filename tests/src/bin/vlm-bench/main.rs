@@ -5,6 +5,7 @@ mod report;
 mod pareto;
 mod grid;
 mod bake;
+mod clearance;
 mod output;
 
 use std::process::ExitCode;
@@ -34,6 +35,8 @@ enum Command {
     /// One bake, in the process whose memory `bake` measures
     #[command(hide = true)]
     BakeChild(bake::ChildArgs),
+    /// How well lights hide behind their surface, over files and budgets
+    Clearance(clearance::ClearanceArgs),
     /// Form factors of a file of cases, or the stress test
     FormFactor(command::FormFactorArgs),
     /// Measure the form factor's throughput on one core
@@ -48,6 +51,7 @@ fn main() -> ExitCode {
         Command::Grid(args) => grid::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Bake(args) => bake::run(&args).map(|()| ExitCode::SUCCESS),
         Command::BakeChild(args) => bake::run_child(&args).map(|()| ExitCode::SUCCESS),
+        Command::Clearance(args) => clearance::run(&args).map(|()| ExitCode::SUCCESS),
         Command::FormFactor(args) => command::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Kernel(args) => kernel::run(&args).map(|()| ExitCode::SUCCESS),
     };
