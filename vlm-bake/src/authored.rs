@@ -14,7 +14,7 @@ use crate::samples::{BakedLight, WorldSample};
 use crate::scene::{AuthoredMesh, AuthoredMode, Scene, Volume};
 use crate::surface::{SurfacePoint, spread_over};
 use crate::tag::{Accusation, TagReason};
-use crate::topology::{barycentric, cross_of};
+use crate::topology::{area, barycentric, cross_of};
 
 /// An authored light stands for surface within this share of the scene's extent. Higher values let a mesh float farther
 /// behind (or in front of) its surface; lower values keep it from finding the far side of a thick wall.
@@ -109,7 +109,9 @@ impl AuthoredLights<'_> {
         let normal = cross_of(corners).try_normalize()?;
         let steering = &self.scene.objects[self.mesh.object as usize].steering;
         let own = self.surface_behind(corners, normal);
-        let lit = own.iter().filter(|(p, _)| self_lighting(&corners, normal, p, self.clearance) > 0.0);
+        let lit = own
+            .iter()
+            .filter(|(p, _)| self_lighting(&corners, normal, p.position, p.normal, self.clearance) > 0.0);
         let mut triangles: Vec<u32> = lit.map(|(point, _)| point.triangle).collect();
         triangles.sort_unstable();
         triangles.dedup();
@@ -132,7 +134,7 @@ impl AuthoredLights<'_> {
 
     /// Points of the visible surface for which the light stands, with their albedo.
     fn surface_behind(&self, corners: [DVec3; 3], normal: DVec3) -> Vec<(SurfacePoint, Vec3)> {
-        let area = 0.5 * cross_of(corners).length() / f64::from(self.options.tests_per_light.max(1));
+        let area = area(corners) / f64::from(self.options.tests_per_light.max(1));
         spread_over(corners, self.options.tests_per_light)
             .filter_map(|p| self.visible.nearest(p, normal.as_vec3()))
             .map(|(triangle, position)| {

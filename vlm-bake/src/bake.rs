@@ -8,7 +8,7 @@ use vlm_format::{Grid, VlmAsset};
 
 use crate::authored;
 use crate::bvh::nearest::closest_point;
-use crate::correspondence::{Correspondence, Light, Standing};
+use crate::correspondence::{Correspondence, Light, points_of_lights};
 use crate::decimate::{Decimation, LightMesh, decimate};
 use crate::flux::{conserve, steer};
 use crate::grid::grid;
@@ -26,7 +26,8 @@ use crate::scene::Scene;
 use crate::slivers::MAX_ASPECT;
 use crate::surface::SurfacePoint;
 use crate::tag::Tags;
-use crate::topology::aspect_ratio;
+use crate::topology::{Lists, area, aspect_ratio};
+use crate::verify::Verification;
 use crate::verify::judge::{Evidence, verify};
 use crate::write::{order, placeable};
 
@@ -90,15 +91,14 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let deepest = DEEPEST * (ground.clearance + distance.mean_m);
     let around = Surroundings { ground: &ground, points: &points, deepest };
     let snap = Snap::new(&patches);
-    let density = densities(scene, &patches, &mesh, &Standing::new(&light_of_point, coarse.len()));
+    let density = densities(scene, &patches, &mesh, &points_of_lights(&light_of_point, coarse.len()));
     let budget = (options.lights as usize).saturating_sub(authored::count(scene));
     let hidden = mend(Refiner::new(mesh, density, &snap), budget, &around);
 
     clock.stage("verify");
-    let hidden = kept(scene, &ground, &points, hidden);
+    let (hidden, light_of_point) = kept(scene, &ground, &points, hidden);
     let lights = &hidden.lights;
-    let light_of_point = Correspondence::new(&ground, lights, |_| true).of(&points);
-    let standing = Standing::new(&light_of_point, lights.len());
+    let standing = points_of_lights(&light_of_point, lights.len());
     let evidence = Evidence { ground: &ground, points: &points, standing: &standing };
     let violations = verify(lights, &evidence);
 
@@ -133,7 +133,7 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let grid_report = grid_report(grid.as_ref());
 
     clock.stage("tag");
-    let (asset, tags, proof) = prove(scene, &mut baked, grid.as_ref(), options, &ground);
+    let (asset, tags, proof) = prove(scene, &mut baked, grid.as_ref(), options, &ground, points);
 
     let mut report = Report {
         visible_triangles: scene.triangles.len(),
@@ -144,7 +144,7 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
         decimation: decimation_report(&decimation, distance),
         offset: offset_report(lights, &hidden.depths),
         clearance: proof.report(),
-        area: area_report(&points, &light_of_point, &baked, &tags),
+        area: area_report(&proof, &baked, &tags),
         flux,
         tags: tags.reports,
         grid: grid_report,
@@ -189,7 +189,7 @@ fn measured_distance(points: &[SurfacePoint], light_of_point: &[Option<u32>], fa
 }
 
 /// The artist's density per face; 0 where a face stands for nothing, or where the offset made it too thin to be a light.
-fn densities(scene: &Scene, patches: &Patches, mesh: &LightMesh, standing: &Standing) -> Vec<f64> {
+fn densities(scene: &Scene, patches: &Patches, mesh: &LightMesh, standing: &Lists) -> Vec<f64> {
     let density = |(f, face): (usize, &crate::decimate::Face)| {
         let primitive = &scene.primitives[patches.regions[face.region as usize].primitive as usize];
         let asked = f64::from(scene.objects[primitive.object as usize].steering.density);
@@ -221,13 +221,9 @@ fn offset_report(lights: &[Light], depths: &[f64]) -> OffsetReport {
     }
 }
 
-fn area_report(
-    points: &[SurfacePoint],
-    light_of_point: &[Option<u32>],
-    lights: &[BakedLight],
-    tags: &Tags,
-) -> AreaReport {
-    let of = |l: &BakedLight| 0.5 * crate::topology::cross_of(l.corners).length();
+fn area_report(proof: &Verification, lights: &[BakedLight], tags: &Tags) -> AreaReport {
+    let Verification { points, light_of_point, .. } = proof;
+    let of = |l: &BakedLight| area(l.corners);
     let uncovered = points.iter().zip(light_of_point).filter(|(_, light)| light.is_none());
     AreaReport {
         visible_m2: points.iter().map(|p| p.area).sum(),

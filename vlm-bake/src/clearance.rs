@@ -2,8 +2,6 @@
 
 use glam::DVec3;
 
-use crate::surface::SurfacePoint;
-
 /// The clearance that a scene needs, in metres.
 ///
 /// Two things can move a light against its surface after the bake. Rounding: a coordinate `p` in single precision is known to
@@ -20,29 +18,23 @@ pub fn required_clearance(bounds: [DVec3; 2]) -> f64 {
     2.0 * (extent * 2f64.powi(-14) + 8.0 * farthest * 2f64.powi(-24))
 }
 
-/// How far a light reaches above the horizon of a point: the greatest height of a corner, negative where all lie below.
+/// How far a light reaches above the horizon of a place with that normal: the greatest height of a corner, negative where all lie
+/// below.
 #[must_use]
-pub fn rise(light: &[DVec3; 3], point: &SurfacePoint) -> f64 {
-    light.iter().map(|v| (*v - point.position).dot(point.normal)).fold(f64::NEG_INFINITY, f64::max)
+pub fn rise(light: &[DVec3; 3], place: DVec3, normal: DVec3) -> f64 {
+    light.iter().map(|v| (*v - place).dot(normal)).fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// By how much a light must move before it no longer lights a point for which it stands, clearance included; 0 or
-/// less if it does not. A light leaves a point dark if the point lies behind its plane or the light below the point's horizon.
+/// By how much a light must move before it no longer lights a place with that normal, clearance included; 0 or less if it does
+/// not. A light leaves a place dark if that lies behind its plane, or the light below the place's horizon.
 #[must_use]
-pub fn self_lighting(light: &[DVec3; 3], normal: DVec3, point: &SurfacePoint, clearance: f64) -> f64 {
-    let before = (point.position - light[0]).dot(normal);
-    rise(light, point).min(before) + clearance
-}
-
-/// True if a light lights a place with that normal, or comes nearer to that than the clearance.
-#[must_use]
-pub fn lights_place(
+pub fn self_lighting(
     light: &[DVec3; 3],
     light_normal: DVec3,
     place: DVec3,
     normal: DVec3,
     clearance: f64,
-) -> bool {
-    let rise = light.iter().map(|v| (*v - place).dot(normal)).fold(f64::NEG_INFINITY, f64::max);
-    rise.min((place - light[0]).dot(light_normal)) + clearance > 0.0
+) -> f64 {
+    let before = (place - light[0]).dot(light_normal);
+    rise(light, place, normal).min(before) + clearance
 }

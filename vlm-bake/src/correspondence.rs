@@ -12,7 +12,7 @@ use crate::ground::Ground;
 use crate::grouped_bvh::GroupedBvh;
 use crate::patches::Patches;
 use crate::surface::SurfacePoint;
-use crate::topology::cross_of;
+use crate::topology::{Lists, area, cross_of, longest_edge};
 
 /// A light stands only for points whose normal is at most this far (cosine) from its own. Lower values let a light stand
 /// for the side walls of what was decimated away, which it can never clear; higher values leave more of the surface without
@@ -38,13 +38,13 @@ impl Light {
     /// Area in square metres.
     #[must_use]
     pub fn area(&self) -> f64 {
-        0.5 * cross_of(self.corners).length()
+        area(self.corners)
     }
 
     /// Length of the longest edge, metres.
     #[must_use]
     pub fn longest_edge(&self) -> f64 {
-        (0..3).map(|i| self.corners[i].distance(self.corners[(i + 1) % 3])).fold(0.0, f64::max)
+        longest_edge(self.corners)
     }
 
     /// Unit normal on the emitting side; zero without area.
@@ -109,39 +109,9 @@ impl<'a> Correspondence<'a> {
     }
 }
 
-/// The numbers of the points for which each light stands, as offsets and a list.
-#[derive(Clone, Debug, Default)]
-pub struct Standing {
-    starts: Vec<u32>,
-    points: Vec<u32>,
-}
-
-impl Standing {
-    /// Inverts [`Correspondence::of`] for that many lights.
-    #[must_use]
-    pub fn new(light_of_point: &[Option<u32>], lights: usize) -> Self {
-        let mut starts = vec![0u32; lights + 1];
-        for light in light_of_point.iter().flatten() {
-            starts[*light as usize + 1] += 1;
-        }
-        for l in 0..lights {
-            starts[l + 1] += starts[l];
-        }
-        let mut next = starts.clone();
-        let mut points = vec![0; starts[lights] as usize];
-        for (point, light) in light_of_point.iter().enumerate() {
-            if let Some(light) = light {
-                let slot = &mut next[*light as usize];
-                points[*slot as usize] = point as u32;
-                *slot += 1;
-            }
-        }
-        Self { starts, points }
-    }
-
-    /// The points of a light, ascending.
-    #[must_use]
-    pub fn of(&self, light: usize) -> &[u32] {
-        &self.points[self.starts[light] as usize..self.starts[light + 1] as usize]
-    }
+/// The numbers of the points for which each of so many lights stands, ascending: [`Correspondence::of`] inverted.
+#[must_use]
+pub fn points_of_lights(light_of_point: &[Option<u32>], lights: usize) -> Lists {
+    let pairs = light_of_point.iter().enumerate();
+    Lists::new(lights, pairs.filter_map(|(point, light)| Some(((*light)?, point as u32))))
 }

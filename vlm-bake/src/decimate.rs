@@ -13,7 +13,7 @@ use crate::options::BakeOptions;
 use crate::patches::Patches;
 use crate::planar::merge_coplanar;
 use crate::slivers::remove_slivers;
-use crate::topology::cross_of;
+use crate::topology::{area, cross_of};
 
 /// Decimation takes more faces than its share of the budget rather than exceed this error (a share of the extent): lights on a
 /// surface that is no longer there come out of thin objects. Higher values keep more of the budget for dividing large lights.
@@ -65,7 +65,7 @@ impl LightMesh {
     /// Area of a face in square metres.
     #[must_use]
     pub fn area(&self, face: usize) -> f64 {
-        0.5 * cross_of(self.corners(face)).length()
+        area(self.corners(face))
     }
 
     /// Unit normal of a face on its emitting side; zero for a face without area.

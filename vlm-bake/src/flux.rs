@@ -16,7 +16,7 @@ use crate::patches::Patches;
 use crate::samples::BakedLight;
 use crate::scene::{Scene, Surface};
 use crate::surface::SurfacePoint;
-use crate::topology::cross_of;
+use crate::topology::area;
 
 /// Lights are scaled by at most this factor, up or down: beyond it, what is left would be a hot spot in place of much that was dropped.
 /// What is cut off is lost, and reported.
@@ -128,7 +128,7 @@ fn sent_by_surface(
 fn sent_by_lights(scene: &Scene, lights: &[BakedLight]) -> Vec<Sent> {
     let mut sent = vec![Sent::default(); scene.objects.len()];
     for light in lights {
-        let area = 0.5 * cross_of(light.corners).length();
+        let area = area(light.corners);
         let to = &mut sent[light.object as usize];
         to.area += area;
         to.rest_area += light.rest_area;

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use vlm_format::Grid;
 
 use crate::scene::Scene;
+use crate::topology::Lists;
 
 /// The most cells along the longest axis: bounds the look-up table at 64 MiB.
 const MOST_CELLS: f64 = 256.0;
@@ -67,14 +68,14 @@ pub fn grid(scene: &Scene, lights: &[[DVec3; 3]], cell_size: Option<f32>, range:
     }
     let lattice = Lattice::over(scene.bounds()?, cell_size);
     let cells = surface_cells(scene, &lattice);
-    let (starts, entries) = scatter(lights, &lattice, &cells, f64::from(range));
+    let lists = scatter(lights, &lattice, &cells, f64::from(range));
     Some(Grid {
         origin: lattice.origin.as_vec3(),
         cell_size: lattice.size as f32,
         dimensions: lattice.dimensions,
         cells,
-        starts,
-        entries,
+        starts: lists.starts,
+        entries: lists.items,
     })
 }
 
@@ -105,26 +106,11 @@ fn surface_cells(scene: &Scene, lattice: &Lattice) -> Vec<u32> {
 }
 
 /// Scatters the lights: counts the lights of each stored cell, then fills the lists in the order of the lights.
-fn scatter(lights: &[[DVec3; 3]], lattice: &Lattice, cells: &[u32], range: f64) -> (Vec<u32>, Vec<u32>) {
+fn scatter(lights: &[[DVec3; 3]], lattice: &Lattice, cells: &[u32], range: f64) -> Lists {
     let reached: Vec<Vec<u32>> =
         lights.par_iter().map(|&corners| reached_cells(corners, lattice, cells, range)).collect();
-    let mut starts = vec![0u32; cells.len() + 1];
-    for &cell in reached.iter().flatten() {
-        starts[cell as usize + 1] += 1;
-    }
-    for i in 0..cells.len() {
-        starts[i + 1] += starts[i];
-    }
-    let mut next = starts.clone();
-    let mut entries = vec![0; starts[cells.len()] as usize];
-    for (light, cells) in reached.iter().enumerate() {
-        for &cell in cells {
-            let slot = &mut next[cell as usize];
-            entries[*slot as usize] = light as u32;
-            *slot += 1;
-        }
-    }
-    (starts, entries)
+    let lights = reached.iter().zip(0..);
+    Lists::new(cells.len(), lights.flat_map(|(cells, light)| cells.iter().map(move |&cell| (cell, light))))
 }
 
 /// The stored cells (as indices into `cells`) that the half ball in front of a light touches.

@@ -7,6 +7,7 @@ use crate::patches::Patches;
 use crate::scene::Scene;
 use crate::signed_distance::IslandDistance;
 use crate::surface::{SurfacePoint, centre_points, feature_points, spread_points};
+use crate::topology::Lists;
 use crate::way_out::WayOut;
 
 /// A light stands for surface at most this share of the scene's extent away. Higher values cover more of what coarse
@@ -32,7 +33,9 @@ pub struct Ground<'a> {
     /// Ways out of objects, through all that is visible.
     pub way_out: WayOut,
     /// The triangles around each vertex of the patches.
-    pub around: VertexTriangles,
+    pub around: Lists,
+    /// The object of each region.
+    pub objects: Vec<u32>,
     /// Required distance of a light behind its surface, metres.
     pub clearance: f64,
     /// A light stands for surface at most this far away, metres.
@@ -48,7 +51,8 @@ impl<'a> Ground<'a> {
             patches,
             distance: IslandDistance::new(patches),
             way_out: WayOut::new(scene, patches),
-            around: VertexTriangles::new(patches),
+            around: triangles_around(patches),
+            objects: patches.regions.iter().map(|r| scene.primitives[r.primitive as usize].object).collect(),
             clearance: required_clearance(bounds),
             reach: REACH_SHARE * (bounds[1] - bounds[0]).max_element(),
         }
@@ -68,38 +72,9 @@ impl<'a> Ground<'a> {
     }
 }
 
-/// The triangles around each vertex, as offsets and a list.
-pub struct VertexTriangles {
-    starts: Vec<u32>,
-    triangles: Vec<u32>,
-}
-
-impl VertexTriangles {
-    fn new(patches: &Patches) -> Self {
-        let mut starts = vec![0u32; patches.positions.len() + 1];
-        for &v in patches.triangles.as_flattened() {
-            starts[v as usize + 1] += 1;
-        }
-        for v in 1..starts.len() {
-            starts[v] += starts[v - 1];
-        }
-        let mut next = starts.clone();
-        let mut triangles = vec![0; patches.triangles.len() * 3];
-        for (t, corners) in patches.triangles.iter().enumerate() {
-            for &v in corners {
-                triangles[next[v as usize] as usize] = t as u32;
-                next[v as usize] += 1;
-            }
-        }
-        Self { starts, triangles }
-    }
-
-    /// Those around a vertex, ascending.
-    #[must_use]
-    pub fn of(&self, vertex: u32) -> &[u32] {
-        let v = vertex as usize;
-        &self.triangles[self.starts[v] as usize..self.starts[v + 1] as usize]
-    }
+fn triangles_around(patches: &Patches) -> Lists {
+    let corners = patches.triangles.iter().zip(0..);
+    Lists::new(patches.positions.len(), corners.flat_map(|(&vertices, t)| vertices.map(|v| (v, t))))
 }
 
 /// Gives each triangle's area to its points in equal shares, and a triangle without any a point in its middle.

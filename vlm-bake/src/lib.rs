@@ -4,6 +4,9 @@
 //! `scene -> patches -> decimate -> refine, offset, mend -> verify -> samples, flux -> authored -> grid -> tag, prove -> write`.
 //! For pictures on the CPU: `scene, bvh -> camera -> shade -> gbuffer -> reference | render -> picture`.
 
+// No input may crash a program that links this.
+#![warn(clippy::expect_used, clippy::panic, clippy::unreachable, clippy::todo)]
+
 pub mod options;
 pub mod progress;
 pub mod report;

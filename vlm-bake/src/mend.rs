@@ -8,7 +8,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::clearance::rise;
-use crate::correspondence::{Correspondence, Light, Standing};
+use crate::correspondence::{Correspondence, Light, points_of_lights};
 use crate::decimate::LightMesh;
 use crate::ground::Ground;
 use crate::offset::{Surroundings, offset};
@@ -35,7 +35,7 @@ const LEAST_ROUGH_POINTS: usize = 20_000;
 /// The sizes to which a light may shrink, largest first. Below half, the rest of its surface would be lit from too small a place.
 const SIZES: [f64; 4] = [1.0, 0.85, 0.7, 0.5];
 
-/// A light sinks by itself by at most this share of its longer edges, for the reason that vertices move by no more.
+/// A light sinks by itself by at most this share of its longest edge, for the reason that vertices move by no more.
 const SINK_SHARE: f64 = 0.4;
 
 /// A shrunk light lies this many times the required clearance behind its surface, so that rounding does not fail it.
@@ -100,26 +100,35 @@ fn thinned(points: &[SurfacePoint], budget: usize) -> Vec<SurfacePoint> {
 }
 
 /// The lights as the file will hold them, rounded to single precision in the space of their node, without those that would be too thin
-/// or stand for no surface.
+/// or stand for no surface; and the light that stands for each point.
 #[must_use]
-pub fn kept(scene: &Scene, ground: &Ground, points: &[SurfacePoint], hidden: Hidden) -> Hidden {
+pub fn kept(
+    scene: &Scene,
+    ground: &Ground,
+    points: &[SurfacePoint],
+    hidden: Hidden,
+) -> (Hidden, Vec<Option<u32>>) {
     let Hidden { mut lights, coarse, depths, rest_areas } = hidden;
     lights.par_iter_mut().for_each(|light| {
-        let primitive = ground.patches.regions[light.region as usize].primitive;
-        let object = &scene.objects[scene.primitives[primitive as usize].object as usize];
+        let object = &scene.objects[ground.objects[light.region as usize] as usize];
         light.corners = as_stored(object.world_from_node, light.corners);
     });
     let shaped: Vec<bool> = lights.iter().map(|l| aspect_ratio(l.corners) <= MAX_ASPECT).collect();
-    let light_of_point = Correspondence::new(ground, &lights, |l| shaped[l]).of(points);
-    let standing = Standing::new(&light_of_point, lights.len());
-    let keep = |l: usize| shaped[l] && !standing.of(l).is_empty();
-    let chosen: Vec<usize> = (0..lights.len()).filter(|&l| keep(l)).collect();
-    Hidden {
+    let mut light_of_point = Correspondence::new(ground, &lights, |l| shaped[l]).of(points);
+    let standing = points_of_lights(&light_of_point, lights.len());
+    let chosen: Vec<usize> = (0..lights.len()).filter(|&l| !standing.of(l).is_empty()).collect();
+    let mut number = vec![0; lights.len()];
+    for (new, &old) in (0..).zip(&chosen) {
+        number[old] = new;
+    }
+    light_of_point.iter_mut().flatten().for_each(|light| *light = number[*light as usize]);
+    let hidden = Hidden {
         lights: chosen.iter().map(|&l| lights[l]).collect(),
         coarse: chosen.iter().map(|&l| coarse[l]).collect(),
         depths: chosen.iter().map(|&l| depths[l]).collect(),
         rest_areas: chosen.iter().map(|&l| rest_areas[l]).collect(),
-    }
+    };
+    (hidden, light_of_point)
 }
 
 /// The mesh with its vertices where they hide best, and which faces make lights there.
@@ -140,7 +149,7 @@ fn look<T>(
     what: impl FnOnce(&[Light], &Evidence) -> T,
 ) -> T {
     let correspondence = Correspondence::new(around.ground, lights, |l| emits[l]);
-    let standing = Standing::new(&correspondence.of(around.points), lights.len());
+    let standing = points_of_lights(&correspondence.of(around.points), lights.len());
     let evidence = Evidence { ground: around.ground, points: around.points, standing: &standing };
     what(lights, &evidence)
 }
@@ -174,12 +183,12 @@ fn shrunk(number: u32, lights: &[Light], evidence: &Evidence, deepest: f64) -> O
     let target = MARGIN * evidence.ground.clearance;
     SIZES.iter().find_map(|&size| {
         let smaller = light.corners.map(|v| centre + (v - centre) * size);
-        let needed = |point| (rise(&smaller, point) + target) / point.normal.dot(normal);
+        let needed = |point: &SurfacePoint| {
+            (rise(&smaller, point.position, point.normal) + target) / point.normal.dot(normal)
+        };
         let depth = evidence.own_points(number as usize).map(needed).fold(f64::NEG_INFINITY, f64::max);
         let sunk = Light { corners: smaller.map(|v| v - normal * depth), ..*light };
-        let longest =
-            light.corners[0].distance(light.corners[1]).max(light.corners[1].distance(light.corners[2]));
-        let hides = depth.abs() <= deepest.min(SINK_SHARE * longest)
+        let hides = depth.abs() <= deepest.min(SINK_SHARE * light.longest_edge())
             && judge(number as usize, &sunk, evidence).is_none();
         hides.then_some(sunk)
     })

@@ -21,10 +21,11 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use crate::clearance::self_lighting;
-use crate::correspondence::{Correspondence, Light, Standing};
+use crate::correspondence::{Correspondence, Light, points_of_lights};
 use crate::decimate::LightMesh;
 use crate::ground::Ground;
 use crate::surface::SurfacePoint;
+use crate::topology::Lists;
 
 /// Lights are moved this much farther than the clearance that `verify` asks for, so that rounding on the way does not fail it.
 const MARGIN: f64 = 1.02;
@@ -61,19 +62,27 @@ struct Plane {
     triangle: u32,
 }
 
+/// What keeps each vertex from moving on.
+struct Limits {
+    /// Metres.
+    deepest: Vec<f64>,
+    /// The object that it must not leave.
+    objects: Vec<u32>,
+}
+
 /// Moves the vertices of `mesh` from their places of rest. `emits` is false for faces that make no lights. Faces of two-sided
 /// surfaces stay where they are: no place behind hides them, so they are tagged later.
 pub fn offset(mesh: &mut LightMesh, rest: &[DVec3], emits: &[bool], around: &Surroundings) {
     let mut planes = face_planes(mesh, rest, emits, around);
-    let deepest = deepest(mesh, rest, around);
+    let limits = Limits { deepest: deepest(mesh, rest, around), objects: objects_of(mesh, around) };
     let mut dirty: Vec<u32> = (0..rest.len() as u32).collect();
-    let mut standing = Standing::default();
+    let mut standing = Lists::default();
     for round in 0..ROUNDS {
-        settle(mesh, rest, &planes, &dirty, &deepest, around);
+        settle(mesh, rest, &planes, &dirty, &limits, around);
         let lights = mesh.lights();
         if round % 2 == 0 {
             let correspondence = Correspondence::new(around.ground, &lights, |l| emits[l]);
-            standing = Standing::new(&correspondence.of(around.points), lights.len());
+            standing = points_of_lights(&correspondence.of(around.points), lights.len());
         }
         let found = crossed_planes(mesh, &lights, rest, &standing, around);
         dirty.clear();
@@ -116,7 +125,7 @@ fn crossed_planes(
     mesh: &LightMesh,
     lights: &[Light],
     rest: &[DVec3],
-    standing: &Standing,
+    standing: &Lists,
     around: &Surroundings,
 ) -> Vec<(u32, Plane)> {
     let crossed = |l: usize| {
@@ -142,7 +151,8 @@ fn planes_of_light(
     let target = MARGIN * around.ground.clearance;
     let mut found = Vec::new();
     for point in own.iter().map(|&p| &around.points[p as usize]) {
-        if self_lighting(&light.corners, normal, point, around.ground.clearance) <= 0.0 {
+        if self_lighting(&light.corners, normal, point.position, point.normal, around.ground.clearance) <= 0.0
+        {
             continue;
         }
         for (corner, v) in light.corners.into_iter().zip(vertices) {
@@ -172,15 +182,10 @@ fn deepest(mesh: &LightMesh, rest: &[DVec3], around: &Surroundings) -> Vec<f64> 
 
 /// The object of each vertex.
 fn objects_of(mesh: &LightMesh, around: &Surroundings) -> Vec<u32> {
-    let patches = around.ground.patches;
-    let mut object_of_region = vec![0; patches.regions.len()];
-    for (t, &region) in patches.triangle_region.iter().enumerate() {
-        object_of_region[region as usize] = patches.vertex_object[patches.triangles[t][0] as usize];
-    }
     let mut objects = vec![0; mesh.positions.len()];
     for face in &mesh.faces {
         for v in face.vertices {
-            objects[v as usize] = object_of_region[face.region as usize];
+            objects[v as usize] = around.ground.objects[face.region as usize];
         }
     }
     objects
@@ -192,14 +197,13 @@ fn settle(
     rest: &[DVec3],
     planes: &[Vec<Plane>],
     dirty: &[u32],
-    deepest: &[f64],
+    limits: &Limits,
     around: &Surroundings,
 ) {
-    let objects = objects_of(mesh, around);
     let place = |&v: &u32| {
-        let (at, deepest) = (rest[v as usize], deepest[v as usize]);
+        let (at, deepest) = (rest[v as usize], limits.deepest[v as usize]);
         let planes: Vec<Plane> = planes[v as usize].iter().filter(|p| p.depth <= deepest).copied().collect();
-        let object = objects[v as usize];
+        let object = limits.objects[v as usize];
         (v, at + displacement(at, planes, deepest, object, around))
     };
     let moved: Vec<(u32, DVec3)> = dirty.par_iter().map(place).collect();

@@ -12,7 +12,7 @@ use petgraph::unionfind::UnionFind;
 use rustc_hash::FxHashMap;
 
 use crate::scene::{Scene, Surface};
-use crate::topology::{cross_of, edge_uses, edges};
+use crate::topology::{area, edge_uses, edges};
 
 /// Two neighbours whose albedos differ by more than this, in the square root of linear albedo (about evenly spaced to
 /// the eye), lie on different sides of a border. Lower values keep more borders, and more lights are spent on them;
@@ -74,7 +74,7 @@ impl Patches {
     /// Area of a triangle's front in square metres.
     #[must_use]
     pub fn area(&self, triangle: usize) -> f64 {
-        0.5 * cross_of(self.corners(triangle)).length()
+        area(self.corners(triangle))
     }
 
     /// The region of a triangle.

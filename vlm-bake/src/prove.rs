@@ -10,6 +10,7 @@ use crate::patches::Patches;
 use crate::render::triangle_tags;
 use crate::samples::BakedLight;
 use crate::scene::Scene;
+use crate::surface::SurfacePoint;
 use crate::tag::{Accusation, TagReason, Tags, tag};
 use crate::tag_cost::measure;
 use crate::verify::judge::Violation;
@@ -27,11 +28,11 @@ pub fn accusations(
     violations: Vec<Violation>,
 ) -> Vec<Option<Accusation>> {
     let mut accused: Vec<Option<Accusation>> = vec![None; lights.len()];
-    let neighbours = SmoothNeighbours::new(patches);
+    let two_sided = |v: &Violation| patches.regions[lights[v.light as usize].region as usize].two_sided;
+    let neighbours = violations.iter().any(two_sided).then(|| SmoothNeighbours::new(patches));
     for mut violation in violations {
-        let light = &lights[violation.light as usize];
-        let two_sided = patches.regions[light.region as usize].two_sided;
-        if two_sided {
+        let two_sided = two_sided(&violation);
+        if let Some(neighbours) = neighbours.as_ref().filter(|_| two_sided) {
             neighbours.widen(&mut violation.triangles);
         }
         let triangles = violation.triangles.iter().flat_map(|&t| patches.scene_triangles(t)).collect();
@@ -50,35 +51,40 @@ fn reason(two_sided: bool, pokes_out: bool) -> TagReason {
 }
 
 /// Tags the lights, assembles the asset and proves it. Where the proof finds what the check of the stages before it did not, from no more
-/// than the file holds, that is tagged too.
+/// than the file holds, that is tagged too. `points` are the ground's.
 pub fn prove(
     scene: &Scene,
     baked: &mut [BakedLight],
     grid: Option<&Grid>,
     options: &BakeOptions,
     ground: &Ground,
+    mut points: Vec<SurfacePoint>,
 ) -> (VlmAsset, Tags, Verification) {
+    let patches = ground.patches;
     let mut round = 0;
     loop {
-        let mut tags = tag(scene, ground.patches, baked);
+        let mut tags = tag(scene, patches, baked);
         let asset = assemble(scene, baked, &tags, grid.cloned(), options);
-        let proof = check(scene, &asset, ground);
+        let count = points.len();
+        let mut proof = check(scene, &asset, ground, points);
         round += 1;
         if round == PROOFS || proof.untagged().next().is_none() {
-            measure(ground.patches, baked, &triangle_tags(scene, &asset), &proof, &mut tags.reports);
+            measure(patches, baked, &triangle_tags(scene, &asset), &proof, &mut tags.reports);
             return (asset, tags, proof);
         }
         for finding in proof.untagged() {
             let light = &mut baked[finding.light as usize];
+            let two_sided = finding.triangles.iter().any(|&t| patches.triangle_two_sided[t as usize]);
             let accused = light.accused.get_or_insert_with(|| Accusation {
                 triangles: Vec::new(),
-                reason: reason(false, finding.kind == FindingKind::PokesOut),
+                reason: reason(two_sided, finding.kind == FindingKind::PokesOut),
             });
-            accused
-                .triangles
-                .extend(finding.triangles.iter().map(|&t| ground.patches.triangle_source[t as usize]));
+            accused.triangles.extend(finding.triangles.iter().flat_map(|&t| patches.scene_triangles(t)));
             accused.triangles.sort_unstable();
             accused.triangles.dedup();
         }
+        // Without the samples that the check added.
+        points = std::mem::take(&mut proof.points);
+        points.truncate(count);
     }
 }

@@ -13,12 +13,12 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::f32::consts::PI;
 
-use crate::correspondence::{Light, Standing};
+use crate::correspondence::Light;
 use crate::patches::Patches;
 use crate::scene::Scene;
 use crate::surface::SurfacePoint;
 use crate::tag::Accusation;
-use crate::topology::cross_of;
+use crate::topology::{Lists, cross_of};
 
 /// The surface may be at most this many times as large as the light that stands for it: more would make that light a hot spot. What
 /// is cut off is lost.
@@ -83,7 +83,7 @@ pub struct Sources<'a> {
     /// Points on the visible surface.
     pub points: &'a [SurfacePoint],
     /// Which of them each light stands for.
-    pub standing: &'a Standing,
+    pub standing: &'a Lists,
 }
 
 /// The finished lights, each with at most `count` samples. Lights without any surface are left out.

@@ -15,7 +15,7 @@ use vlm_format::TriangleTags;
 use crate::patches::Patches;
 use crate::samples::BakedLight;
 use crate::scene::Scene;
-use crate::topology::cross_of;
+use crate::topology::area;
 
 /// Why a tag was given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -173,7 +173,7 @@ fn reports(scene: &Scene, patches: &Patches, lights: &[BakedLight], tags: &Tags)
         });
         entry.reason = entry.reason.min(reason);
         entry.lights += 1;
-        entry.area_m2 += 0.5 * cross_of(light.corners).length();
+        entry.area_m2 += area(light.corners);
     }
     for (t, &source) in patches.triangle_source.iter().enumerate() {
         if let Some(report) = reports.get_mut(&tags.triangles[source as usize]) {

@@ -14,7 +14,7 @@ use crate::patches::Patches;
 use crate::samples::BakedLight;
 use crate::surface::SurfacePoint;
 use crate::tag::TagReport;
-use crate::topology::cross_of;
+use crate::topology;
 use crate::verify::Verification;
 
 /// Surface points per tag. Higher values are less noisy and slower, each by the number of lights.
@@ -53,7 +53,7 @@ pub fn measure(
             let pairs = numbers.iter().step_by(numbers.len().div_ceil(LIGHTS).max(1));
             let [flux, lost] = pairs.fold([0.0, 0.0], |[flux, lost], &l| {
                 let corners = lights[l as usize].corners;
-                let area = 0.5 * cross_of(corners).length();
+                let area = topology::area(corners);
                 [flux + area, lost + surface.received(corners, |triangle| own.contains(&(l, triangle)))]
             });
             // Surface may hide surface, and then more than all arrives.

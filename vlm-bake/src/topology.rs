@@ -43,12 +43,61 @@ pub fn cross_of(p: [glam::DVec3; 3]) -> glam::DVec3 {
     (p[1] - p[0]).cross(p[2] - p[0])
 }
 
+/// Area of a triangle.
+#[must_use]
+pub fn area(p: [glam::DVec3; 3]) -> f64 {
+    0.5 * cross_of(p).length()
+}
+
+/// Length of the longest edge of a triangle.
+#[must_use]
+pub fn longest_edge(p: [glam::DVec3; 3]) -> f64 {
+    (0..3).map(|i| p[i].distance_squared(p[(i + 1) % 3])).fold(0.0, f64::max).sqrt()
+}
+
 /// Longest edge over the height that stands on it; infinite for a triangle without area.
 #[must_use]
 pub fn aspect_ratio(p: [glam::DVec3; 3]) -> f64 {
     let longest = (0..3).map(|i| p[i].distance_squared(p[(i + 1) % 3])).fold(0.0, f64::max);
     let doubled_area = cross_of(p).length();
     if doubled_area > 0.0 { longest / doubled_area } else { f64::INFINITY }
+}
+
+/// Lists of numbers, one after the other in one array: counted, then filled.
+#[derive(Clone, Debug, Default)]
+pub struct Lists {
+    /// One more than there are lists: where each begins in `items`, and the end of the last.
+    pub starts: Vec<u32>,
+    /// The lists.
+    pub items: Vec<u32>,
+}
+
+impl Lists {
+    /// Puts the item of each `(list, item)` into its list, below `count`; items keep their order.
+    #[must_use]
+    pub fn new(count: usize, pairs: impl Iterator<Item = (u32, u32)> + Clone) -> Self {
+        let mut starts = vec![0u32; count + 1];
+        for (list, _) in pairs.clone() {
+            starts[list as usize + 1] += 1;
+        }
+        for list in 0..count {
+            starts[list + 1] += starts[list];
+        }
+        let mut next = starts.clone();
+        let mut items = vec![0; starts[count] as usize];
+        for (list, item) in pairs {
+            let slot = &mut next[list as usize];
+            items[*slot as usize] = item;
+            *slot += 1;
+        }
+        Self { starts, items }
+    }
+
+    /// One of the lists.
+    #[must_use]
+    pub fn of(&self, list: usize) -> &[u32] {
+        &self.items[self.starts[list] as usize..self.starts[list + 1] as usize]
+    }
 }
 
 /// Barycentric weights of a point in the plane of a triangle; a third each where it has no area.
@@ -74,6 +123,12 @@ mod tests {
         assert_eq!(shared.len(), 1);
         assert_eq!((shared[0][0].low, shared[0][0].high), (0, 2));
         assert_eq!(edges(&uses).count(), 5);
+    }
+
+    #[test]
+    fn items_keep_their_order_within_their_lists() {
+        let lists = Lists::new(3, [(2, 7), (0, 8), (2, 5)].into_iter());
+        assert_eq!([0, 1, 2].map(|list| lists.of(list).to_vec()), [vec![8], vec![], vec![7, 5]]);
     }
 
     #[test]

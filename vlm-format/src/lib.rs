@@ -4,6 +4,9 @@
 //! out. A file is checked before anything follows its indices, and written by patching its JSON and appending to its
 //! binary data, so that every byte and value of others stays as it was.
 
+// No input may crash a program that links this.
+#![warn(clippy::expect_used, clippy::panic, clippy::unreachable, clippy::todo)]
+
 mod error;
 mod glb;
 mod uri;

@@ -4,7 +4,7 @@ use glam::DVec3;
 use vlm_format::VlmAsset;
 
 use crate::scene::Scene;
-use crate::topology::cross_of;
+use crate::topology::{area, cross_of};
 
 /// One element per light of the asset.
 pub struct WorldLights {
@@ -49,6 +49,6 @@ impl WorldLights {
 
     /// Area of a light, square metres.
     pub fn area(&self, light: usize) -> f64 {
-        0.5 * cross_of(self.corners[light]).length()
+        area(self.corners[light])
     }
 }

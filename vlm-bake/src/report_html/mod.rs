@@ -78,7 +78,8 @@ pub fn report_html(subjects: &Subjects) -> Result<String, ImageError> {
     let surfaces = scene.triangle_surfaces();
     let patches = patches(scene, &surfaces, asset.settings.lights);
     let ground = Ground::new(scene, &patches);
-    let verification = check(scene, asset, &ground);
+    let points = ground.points(asset.settings.lights as usize);
+    let verification = check(scene, asset, &ground, points);
     let lights = WorldLights::new(scene, asset);
     let checked = Checked::of(&verification, report);
     let evidence = Evidence::new(scene, asset, &lights, &ground, &verification);

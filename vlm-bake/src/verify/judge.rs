@@ -13,12 +13,12 @@ use glam::{DVec3, Vec3, Vec3A};
 use rayon::prelude::*;
 
 use crate::bvh::nearest::closest_point;
-use crate::clearance::{lights_place, self_lighting};
-use crate::correspondence::{LEAST_COSINE, Light, Standing};
+use crate::clearance::self_lighting;
+use crate::correspondence::{LEAST_COSINE, Light};
 use crate::ground::Ground;
 use crate::patches::Region;
 use crate::surface::SurfacePoint;
-use crate::topology::cross_of;
+use crate::topology::{Lists, cross_of};
 
 /// A light comes out of its island when it lies less than this share of the clearance behind it: a mitred vertex at a sharp edge
 /// may be nearer to the edge than to either face.
@@ -54,7 +54,7 @@ pub struct Evidence<'a> {
     /// Points on it.
     pub points: &'a [SurfacePoint],
     /// Which of them each light stands for.
-    pub standing: &'a Standing,
+    pub standing: &'a Lists,
 }
 
 impl<'a> Evidence<'a> {
@@ -103,7 +103,8 @@ impl Violation {
 fn lit_points(number: usize, light: &Light, evidence: &Evidence, violation: &mut Violation) {
     let normal = light.normal();
     for point in evidence.own_points(number) {
-        let depth = self_lighting(&light.corners, normal, point, evidence.ground.clearance);
+        let depth =
+            self_lighting(&light.corners, normal, point.position, point.normal, evidence.ground.clearance);
         if depth > 0.0 {
             violation.points += 1;
             violation.triangles.push(point.triangle);
@@ -121,12 +122,12 @@ fn lit_corners(light: &Light, evidence: &Evidence, triangles: &mut Vec<u32>) {
     for &t in triangles.iter() {
         for v in patches.triangles[t as usize] {
             let place = patches.positions[v as usize];
-            beside.extend(ground.around.of(v).iter().copied().filter(|&other| {
+            beside.extend(ground.around.of(v as usize).iter().copied().filter(|&other| {
                 let n = cross_of(patches.corners(other as usize)).normalize_or_zero();
                 let side = if light.back { -n } else { n };
                 patches.triangle_region[other as usize] == light.region
                     && side.dot(normal) > LEAST_COSINE
-                    && lights_place(&light.corners, normal, place, side, ground.clearance)
+                    && self_lighting(&light.corners, normal, place, side, ground.clearance) > 0.0
             }));
         }
     }
@@ -175,7 +176,7 @@ fn leads_out(
     let start = from - point.normal * ground.way_out.least_length();
     let Some(direction) = (place - start).try_normalize() else { return false };
     let end = place + direction * (POKE_SHARE * ground.clearance);
-    let object = ground.patches.vertex_object[ground.patches.triangles[point.triangle as usize][0] as usize];
+    let object = ground.objects[ground.patches.triangle_region[point.triangle as usize] as usize];
     let own = ground.patches.triangle_source[point.triangle as usize];
     let out = ground.way_out.leads_out(start, end, object, |triangle| triangle == own);
     if out {

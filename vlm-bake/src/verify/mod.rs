@@ -14,7 +14,7 @@ use serde::Serialize;
 use vlm_format::VlmAsset;
 
 use crate::bvh::Bvh;
-use crate::correspondence::{Correspondence, Light, Standing};
+use crate::correspondence::{Correspondence, Light, points_of_lights};
 use crate::ground::Ground;
 use crate::patches::{Patches, patches};
 use crate::render::triangle_tags;
@@ -128,24 +128,29 @@ impl Verification {
 #[must_use]
 pub fn verify_asset(scene: &Scene, asset: &VlmAsset) -> Verification {
     let patches = patches(scene, &scene.triangle_surfaces(), asset.settings.lights);
-    let mut verification = check(scene, asset, &Ground::new(scene, &patches));
+    let ground = Ground::new(scene, &patches);
+    let mut verification = check(scene, asset, &ground, ground.points(asset.settings.lights as usize));
     verification.patches = patches;
     verification
 }
 
-/// The same on a surface that is prepared already; [`Verification::patches`] stays empty.
+/// The same on a surface that is prepared already, at the [`Ground::points`] of the asset's budget; [`Verification::patches`] stays empty.
 #[must_use]
-pub fn check(scene: &Scene, asset: &VlmAsset, ground: &Ground) -> Verification {
+pub fn check(
+    scene: &Scene,
+    asset: &VlmAsset,
+    ground: &Ground,
+    mut points: Vec<SurfacePoint>,
+) -> Verification {
     let placed = placed_lights(scene, asset, ground);
     let lights: Vec<Light> = placed.iter().map(|p| p.light).collect();
-    let mut points = ground.points(asset.settings.lights as usize);
     let derived = |l: usize| !placed[l].authored && placed[l].stands;
     let mut light_of_point = Correspondence::new(ground, &lights, derived).of(&points);
     for (l, light) in placed.iter().enumerate() {
         light_of_point.extend(light.samples.iter().map(|_| Some(l as u32)));
         points.extend(&light.samples);
     }
-    let standing = Standing::new(&light_of_point, lights.len());
+    let standing = points_of_lights(&light_of_point, lights.len());
     let evidence = Evidence { ground, points: &points, standing: &standing };
     let tags = ReceiverTags::new(scene, asset, ground.patches);
     let find = |l: usize| finding(scene, l, &placed[l], &evidence, &tags);
@@ -168,7 +173,7 @@ fn finding(
     let bare = Finding {
         light: number as u32,
         normal: light.normal(),
-        object: scene.objects[placed.object].path.clone(),
+        object: placed.object.map_or_else(String::new, |object| scene.objects[object].path.clone()),
         ..Finding::default()
     };
     if aspect_ratio(light.corners) > MAX_ASPECT * (1.0 + ASPECT_ROUNDING) {
@@ -211,7 +216,7 @@ impl<'a> ReceiverTags<'a> {
 /// A light of an asset in world space.
 struct Placed {
     light: Light,
-    object: usize,
+    object: Option<usize>,
     authored: bool,
     /// Its region is known.
     stands: bool,
@@ -225,8 +230,9 @@ fn placed_lights(scene: &Scene, asset: &VlmAsset, ground: &Ground) -> Vec<Placed
     let surface = SurfaceSearch::new(ground);
     let mut placed = Vec::with_capacity(asset.triangles.len());
     for vlm in &asset.vlms {
-        let Some(&object) = object_of_node.get(&vlm.node) else { continue };
-        let world = scene.objects[object].world_from_node;
+        // Lights of a node without geometry are placed as the file has them, so that the numbers of the others stay.
+        let object = object_of_node.get(&vlm.node).copied();
+        let world = object.map_or(DMat4::IDENTITY, |object| scene.objects[object].world_from_node);
         let numbers = vlm.lights[0] as usize..(vlm.lights[0] + vlm.lights[1]) as usize;
         let place = |l: usize| place(asset, l, object, world, vlm.authored, &surface);
         placed.par_extend(numbers.into_par_iter().map(place));
@@ -237,7 +243,7 @@ fn placed_lights(scene: &Scene, asset: &VlmAsset, ground: &Ground) -> Vec<Placed
 fn place(
     asset: &VlmAsset,
     l: usize,
-    object: usize,
+    object: Option<usize>,
     world: DMat4,
     authored: bool,
     surface: &SurfaceSearch,
@@ -254,11 +260,11 @@ fn place(
         .iter()
         .filter_map(|s| {
             let normal = (world_from_normal * s.normal.as_dvec3()).normalize_or_zero();
-            surface.at(world.transform_point3(s.position.as_dvec3()), normal, object as u32)
+            surface.at(world.transform_point3(s.position.as_dvec3()), normal, object?)
         })
         .collect();
     let centre = corners.iter().sum::<DVec3>() / 3.0;
-    let own = samples.first().copied().or_else(|| surface.at(centre, normal, object as u32));
+    let own = samples.first().copied().or_else(|| surface.at(centre, normal, object?));
     let region = own.map_or(0, |p| surface.patches.triangle_region[p.triangle as usize]);
     let light = Light { corners, region, back: own.is_some_and(|p| p.back) };
     Placed { light, object, authored, stands: own.is_some(), samples }
@@ -267,6 +273,7 @@ fn place(
 /// Finds the surface on which a sample lies.
 struct SurfaceSearch<'a> {
     patches: &'a Patches,
+    objects: &'a [u32],
     bvh: Bvh,
     origin: DVec3,
     normals: Vec<DVec3>,
@@ -275,13 +282,14 @@ struct SurfaceSearch<'a> {
 }
 
 impl<'a> SurfaceSearch<'a> {
-    fn new(ground: &Ground<'a>) -> Self {
+    fn new(ground: &'a Ground<'a>) -> Self {
         let patches = ground.patches;
         let origin = patches.positions.first().copied().unwrap_or_default();
         let local: Vec<glam::Vec3> = patches.positions.iter().map(|p| (*p - origin).as_vec3()).collect();
         let normal = |t: usize| cross_of(patches.corners(t)).normalize_or_zero();
         Self {
             patches,
+            objects: &ground.objects,
             bvh: Bvh::new(&local, &patches.triangles),
             origin,
             normals: (0..patches.triangles.len()).map(normal).collect(),
@@ -291,11 +299,11 @@ impl<'a> SurfaceSearch<'a> {
 
     /// The point of an object's surface nearest to `p` that looks along `normal`, on whichever side reflects. Where several surfaces
     /// meet or coincide, the one with exactly this normal.
-    fn at(&self, p: DVec3, normal: DVec3, object: u32) -> Option<SurfacePoint> {
+    fn at(&self, p: DVec3, normal: DVec3, object: usize) -> Option<SurfacePoint> {
         let cosine = |t: u32| self.normals[t as usize].dot(normal);
         let alike = |t: u32, least: f64| {
             let two_sided = self.patches.region(t as usize).two_sided;
-            let own = self.patches.vertex_object[self.patches.triangles[t as usize][0] as usize] == object;
+            let own = self.objects[self.patches.triangle_region[t as usize] as usize] as usize == object;
             own && (if two_sided { cosine(t).abs() } else { cosine(t) }) > least
         };
         let local = (p - self.origin).as_vec3();
