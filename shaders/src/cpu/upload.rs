@@ -83,6 +83,13 @@ impl LightSet {
 
 /// A light without area, which lights nothing, where the asset's indices are out of range.
 fn world_light(asset: &VlmAsset, light: usize, world_from_node: DMat4) -> LightGeometry {
+    LightGeometry::new(world_corners(asset, light, world_from_node))
+}
+
+/// The corners of a light in world space, metres, counter-clockwise seen from the emitting side; the node's origin where the asset's
+/// indices are out of range.
+#[must_use]
+pub fn world_corners(asset: &VlmAsset, light: usize, world_from_node: DMat4) -> [DVec3; 3] {
     let corner = |i: u32| asset.positions.get(i as usize).copied().unwrap_or_default().as_dvec3();
     let triangle = asset.triangles.get(light).copied().unwrap_or_default();
     let mut corners: [DVec3; 3] = triangle.map(|i| world_from_node.transform_point3(corner(i)));
@@ -90,7 +97,7 @@ fn world_light(asset: &VlmAsset, light: usize, world_from_node: DMat4) -> LightG
     if world_from_node.determinant() < 0.0 {
         corners.swap(1, 2);
     }
-    LightGeometry::new(corners)
+    corners
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use vlm_format::VlmAsset;
+use vlm_shaders::cpu::upload::world_corners;
 
 use crate::scene::Scene;
 use crate::topology::{area, cross_of};
@@ -31,13 +32,8 @@ impl WorldLights {
         for vlm in &asset.vlms {
             let object = scene.objects.iter().position(|o| o.node == vlm.node);
             let world_from_node = object.map(|o| scene.objects[o].world_from_node).unwrap_or_default();
-            let mirrored = world_from_node.determinant() < 0.0;
             for l in (vlm.lights[0] as usize..).take(vlm.lights[1] as usize).take_while(|&l| l < count) {
-                let node = asset.triangles[l].map(|v| asset.positions[v as usize].as_dvec3());
-                let mut corners = node.map(|p| world_from_node.transform_point3(p));
-                if mirrored {
-                    corners.swap(1, 2);
-                }
+                let corners = world_corners(asset, l, world_from_node);
                 lights.corners[l] = corners;
                 lights.normals[l] = cross_of(corners).normalize_or_zero();
                 lights.objects[l] = object.map(|o| o as u32);

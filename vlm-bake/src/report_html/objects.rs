@@ -3,10 +3,8 @@
 use glam::{DVec3, Vec3};
 
 use super::facts::Evidence;
+use crate::flux::TOLERANCE;
 use crate::scene::{Scene, Surface};
-
-/// Albedo and flux of an object's lights may differ from its surface's by this share.
-pub const ALLOWED: f64 = 0.02;
 
 /// One object that makes lights, in figures.
 #[derive(Clone, Debug, Default)]
@@ -45,7 +43,7 @@ impl ObjectFigures {
     #[must_use]
     pub fn why_missed(&self) -> String {
         let (albedo, flux) = (self.albedo_error(), self.flux_ratio - 1.0);
-        if albedo <= ALLOWED && flux.abs() <= ALLOWED {
+        if albedo <= TOLERANCE && flux.abs() <= TOLERANCE {
             return String::new();
         }
         let uncovered = self.uncovered_m2 / self.visible_m2.max(f64::MIN_POSITIVE);
@@ -55,17 +53,17 @@ impl ObjectFigures {
         if self.authored > 0 {
             return "an artist's lights add to its own or replace some of them".to_owned();
         }
-        if flux < -ALLOWED && uncovered > 0.5 * -flux {
+        if flux < -TOLERANCE && uncovered > 0.5 * -flux {
             return format!(
                 "{} of its surface has no light: parts too small for the budget",
                 percent(uncovered)
             );
         }
-        if flux < -ALLOWED {
+        if flux < -TOLERANCE {
             return "its lights are much smaller than the surface that they stand for: small or thin parts"
                 .to_owned();
         }
-        if flux > ALLOWED {
+        if flux > TOLERANCE {
             return "its lights return more than its surface: some stand for the same surface twice"
                 .to_owned();
         }

@@ -8,8 +8,9 @@ use vlm_format::VlmAsset;
 use super::checked::Checked;
 use super::colour::{css, encode, of_tag};
 use super::facts::Evidence;
-use super::objects::{ALLOWED, ObjectFigures, percent};
+use super::objects::{ObjectFigures, percent};
 use super::text::{area, bytes, count, length};
+use crate::flux::TOLERANCE;
 use crate::report::Report;
 use crate::tag::{TagReason, TagReport};
 
@@ -172,7 +173,7 @@ pub fn object_table(what: &str, objects: &[ObjectFigures]) -> Markup {
 
 fn object_row(o: &ObjectFigures) -> Markup {
     let why = o.why_missed();
-    let off = |share: f64| if share.abs() > ALLOWED { "n off" } else { "n" };
+    let off = |share: f64| if share.abs() > TOLERANCE { "n off" } else { "n" };
     let swatches = [o.albedo, o.light_albedo].map(|albedo| css(encode(albedo)));
     html! {
         tr {

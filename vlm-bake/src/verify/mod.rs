@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use serde::Serialize;
 use vlm_format::VlmAsset;
+use vlm_shaders::cpu::upload::world_corners;
 
 use crate::bvh::Bvh;
 use crate::correspondence::{Correspondence, Light, points_of_lights};
@@ -248,11 +249,7 @@ fn place(
     authored: bool,
     surface: &SurfaceSearch,
 ) -> Placed {
-    let mut corners =
-        asset.triangles[l].map(|v| world.transform_point3(asset.positions[v as usize].as_dvec3()));
-    if world.determinant() < 0.0 {
-        corners.swap(1, 2);
-    }
+    let corners = world_corners(asset, l, world);
     let normal = cross_of(corners).normalize_or_zero();
     let of_light = asset.sample_starts[l] as usize..asset.sample_starts[l + 1] as usize;
     let world_from_normal = glam::DMat3::from_mat4(world).inverse().transpose();
