@@ -25,4 +25,5 @@ pub mod hard_meshes;
 pub mod text;
 pub mod grid_bench;
 pub mod bake_bench;
+pub mod breakdown;
 pub mod clearance_bench;

@@ -144,7 +144,7 @@ pub enum MethodError {
 pub struct Stage<'a> {
     /// The scene, ready for rays.
     pub trace: &'a TraceScene<'a>,
-    bakes: Mutex<BTreeMap<(&'static str, u32), Arc<Baked>>>,
+    bakes: Mutex<BTreeMap<String, Arc<Baked>>>,
 }
 
 /// Virtual area lights and what they took.
@@ -171,19 +171,32 @@ impl<'a> Stage<'a> {
         preset.lights(self.trace.scene.triangles.len())
     }
 
-    /// Bakes with a preset and a number of lights, once for each pair of them. A scene in which nothing reflects or
-    /// emits has no lights.
+    /// The options of a preset in this scene, with another number of lights.
+    #[must_use]
+    pub fn options(&self, preset: Preset, lights: u32) -> BakeOptions {
+        BakeOptions { lights, ..BakeOptions::preset(preset, self.trace.scene.triangles.len()) }
+    }
+
+    /// The options of a preset in this scene, with another number of lights and without a grid.
+    #[must_use]
+    pub fn without_grid(&self, preset: Preset, lights: u32) -> BakeOptions {
+        let mut options = self.options(preset, lights);
+        options.grid.probes = 0;
+        options
+    }
+
+    /// Bakes with some options, once for all who ask for the same. A scene in which nothing reflects or emits has no lights.
     ///
     /// # Errors
     /// If the budget leaves no light.
-    pub fn baked(&self, preset: Preset, lights: u32) -> Result<Arc<Baked>, MethodError> {
+    pub fn baked(&self, options: &BakeOptions) -> Result<Arc<Baked>, MethodError> {
         let mut bakes = self.bakes.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(baked) = bakes.get(&(preset.name(), lights)) {
+        let key = format!("{options:?}");
+        if let Some(baked) = bakes.get(&key) {
             return Ok(Arc::clone(baked));
         }
         let scene = self.trace.scene;
-        let options = BakeOptions { lights, ..BakeOptions::preset(preset, scene.triangles.len()) };
-        let baked = match bake(scene, &options, &Silent) {
+        let baked = match bake(scene, options, &Silent) {
             Ok(bake) => {
                 let seconds = &bake.report.seconds;
                 let grid_seconds = seconds.get("grid").copied().unwrap_or(0.0);
@@ -194,7 +207,7 @@ impl<'a> Stage<'a> {
             Err(error) => return Err(error.into()),
         };
         let baked = Arc::new(baked);
-        bakes.insert((preset.name(), lights), Arc::clone(&baked));
+        bakes.insert(key, Arc::clone(&baked));
         Ok(baked)
     }
 

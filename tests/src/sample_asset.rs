@@ -4,7 +4,9 @@
 use base64::Engine;
 use glam::Vec3;
 use serde_json::json;
-use vlm_format::{GltfFile, Grid, Sample, Settings, TriangleTags, Vlm, VlmAsset};
+use vlm_format::{
+    GltfFile, Grid, Leaf, NearLight, Probe, RowWriter, Sample, Settings, TriangleTags, Vlm, VlmAsset,
+};
 
 /// Two lights for each of the first two nodes with a mesh, with samples, tags, emission and a grid. The first primitive that
 /// draws triangles is tagged as a whole, the second by triangle, the first bearer and the last node as nodes.
@@ -15,7 +17,9 @@ pub fn quads(file: &GltfFile) -> VlmAsset {
             preset: String::from("draft"),
             lights: 4,
             cell_size: 0.1,
-            range: 1.5,
+            probes: 2,
+            rays: 16,
+            near: 1,
             samples: 1,
         },
         sample_starts: vec![0],
@@ -26,16 +30,43 @@ pub fn quads(file: &GltfFile) -> VlmAsset {
         push_quad(&mut asset, node.index() as u32);
     }
     tag_surface(&mut asset, file);
-    let entries: Vec<u32> = (0..asset.triangles.len() as u32).collect();
-    asset.grid = Some(Grid {
+    asset.grid = Some(grid(asset.triangles.len() as u32));
+    asset
+}
+
+/// Two cells of 24, one divided, over a probe on surface and one in free space.
+fn grid(lights: u32) -> Grid {
+    let mut rows = RowWriter::default();
+    rows.push((0..lights).map(|light| (light, 200)));
+    rows.push((0..lights.min(1)).map(|light| (light, 1)));
+    let probe = Probe {
+        position: Vec3::new(0.01, 0.3, 0.01),
+        row_scale: 0.001,
+        normal: Vec3::Y,
+        reach_up: 0.05,
+        tangent: Vec3::X,
+        reach_down: 0.05,
+        reach: [0.1, 0.2, 0.1, 0.1],
+    };
+    let mut cells = vec![0; 24 + 8];
+    (cells[1], cells[23], cells[24]) = (1, 2 * 24, 3);
+    Grid {
         origin: Vec3::new(-0.1, 0.2, 1e-7),
         cell_size: 0.1,
         dimensions: [2, 3, 4],
-        cells: vec![1, 23],
-        starts: vec![0, 0, entries.len() as u32],
-        entries,
-    });
-    asset
+        cells,
+        leaves: vec![
+            Leaf { probes: 0, free_probes: 1, near: 0, padding: 0 },
+            Leaf { probes: 2, free_probes: 3, near: lights.min(1), padding: 0 },
+            Leaf { probes: 3, free_probes: 3, near: lights.min(1), padding: 0 },
+        ],
+        leaf_probes: vec![0, 1, 0],
+        near: (0..lights.min(1)).map(|light| NearLight { light, visibility: [128, 0, 0, 0] }).collect(),
+        probes: vec![probe, Probe { normal: Vec3::Z, tangent: Vec3::X, ..probe }],
+        surface_probes: 1,
+        row_starts: rows.starts,
+        rows: rows.words,
+    }
 }
 
 fn tag_surface(asset: &mut VlmAsset, file: &GltfFile) {

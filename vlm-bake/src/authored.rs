@@ -124,11 +124,10 @@ impl AuthoredLights<'_> {
             object: self.mesh.object,
             albedo: painted.unwrap_or_else(mean),
             emission: self.mesh.emission[triangle] * strength,
-            tag: 0,
-            rest_area: 0.0,
             accused: Some(accused).filter(|accused| !accused.triangles.is_empty()),
             authored: true,
             samples: self.samples(&own, painted, strength),
+            ..BakedLight::default()
         })
     }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use glam::{DVec3, Vec3A};
+use glam::Vec3A;
 use vlm_format::{Grid, VlmAsset};
 
 use crate::authored;
@@ -11,7 +11,7 @@ use crate::bvh::nearest::closest_point;
 use crate::correspondence::{Correspondence, Light, points_of_lights};
 use crate::decimate::{Decimation, LightMesh, decimate};
 use crate::flux::{conserve, steer};
-use crate::grid::grid;
+use crate::grid::{GridInput, GridOptions, StandIns, grid};
 use crate::ground::Ground;
 use crate::mend::{kept, mend};
 use crate::offset::Surroundings;
@@ -19,10 +19,12 @@ use crate::options::BakeOptions;
 use crate::patches::{Patches, patches};
 use crate::progress::Progress;
 use crate::prove::{accusations, prove};
+use crate::render::world_lights;
 use crate::refine::{Refiner, Snap};
 use crate::report::{AreaReport, DecimationReport, GridReport, OffsetReport, Report};
 use crate::samples::{BakedLight, Sources, samples};
 use crate::scene::Scene;
+use crate::shade::TraceScene;
 use crate::slivers::MAX_ASPECT;
 use crate::surface::SurfacePoint;
 use crate::tag::Tags;
@@ -40,6 +42,8 @@ const DEEPEST: f64 = 16.0;
 pub struct Bake {
     /// To be written by [`vlm_format`].
     pub asset: VlmAsset,
+    /// Which light stands for which surface.
+    pub stand_ins: StandIns,
     /// To be shown to the user.
     pub report: Report,
 }
@@ -127,13 +131,13 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
         return Err(BakeError::NothingLeft { asked: options.lights });
     }
 
-    clock.stage("grid");
-    let corners: Vec<[DVec3; 3]> = baked.iter().map(|l| l.corners).collect();
-    let grid = grid(scene, &corners, options.cell_size, options.range);
-    let grid_report = grid_report(grid.as_ref());
-
     clock.stage("tag");
-    let (asset, tags, proof) = prove(scene, &mut baked, grid.as_ref(), options, &ground, points);
+    let (mut asset, tags, proof) = prove(scene, &mut baked, options, &ground, points);
+
+    clock.stage("grid");
+    let stand_ins = StandIns::new(scene, &ground, &baked);
+    asset.grid = static_grid(scene, &asset, &stand_ins, &options.grid, progress);
+    asset.settings.cell_size = asset.grid.as_ref().map_or(0.0, |grid| grid.cell_size);
 
     let mut report = Report {
         visible_triangles: scene.triangles.len(),
@@ -147,13 +151,26 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
         area: area_report(&proof, &baked, &tags),
         flux,
         tags: tags.reports,
-        grid: grid_report,
+        grid: grid_report(asset.grid.as_ref()),
         notes: notes(scene, authored_dropped),
         ..Report::default()
     };
     report.missed_because = why_missed(&report, options);
     report.seconds = clock.finish();
-    Ok(Bake { asset, report })
+    Ok(Bake { asset, stand_ins, report })
+}
+
+/// The static grid over an asset's lights.
+fn static_grid(
+    scene: &Scene,
+    asset: &VlmAsset,
+    stand_ins: &StandIns,
+    options: &GridOptions,
+    progress: &dyn Progress,
+) -> Option<Grid> {
+    let lights = world_lights(scene, asset).ok()?;
+    let trace = TraceScene::new(scene);
+    grid(&GridInput { trace: &trace, stand_ins, lights: &lights }, options, progress)
 }
 
 fn authored_lights(lights: &[BakedLight]) -> usize {
@@ -236,10 +253,11 @@ fn area_report(proof: &Verification, lights: &[BakedLight], tags: &Tags) -> Area
 
 fn grid_report(grid: Option<&Grid>) -> GridReport {
     grid.map_or_else(GridReport::default, |g| GridReport {
-        cells: g.dimensions.iter().map(|&d| u64::from(d)).product(),
-        stored_cells: g.cells.len(),
-        entries: g.entries.len(),
-        bytes: 4 * (g.cells.len() + g.starts.len() + g.entries.len()),
+        leaves: g.leaves.len().saturating_sub(1),
+        probes: g.probes.len(),
+        near_entries: g.near.len(),
+        far_entries: g.row_starts.last().map_or(0, |&end| end as usize),
+        bytes: g.byte_len(),
     })
 }
 

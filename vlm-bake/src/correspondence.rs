@@ -102,6 +102,14 @@ impl<'a> Correspondence<'a> {
         along(-point.normal).or_else(|| along(point.normal)).or(Some(near.triangle))
     }
 
+    /// The nearest light of a point's region and side, whichever way it looks: for surface that no light stands for.
+    #[must_use]
+    pub fn nearest_of(&self, point: &SurfacePoint) -> Option<u32> {
+        let own = self.patches.triangle_region[point.triangle as usize];
+        let alike = |l: u32| self.sides[l as usize] == point.back;
+        self.regions.closest(own, point.inner, self.reach, alike).map(|near| near.triangle)
+    }
+
     /// The light of each point.
     #[must_use]
     pub fn of(&self, points: &[SurfacePoint]) -> Vec<Option<u32>> {

@@ -9,8 +9,9 @@
 
 use std::f32::consts::PI;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use serde::Serialize;
+use vlm_shaders::cpu::resolve::luminance;
 
 use crate::patches::Patches;
 use crate::samples::BakedLight;
@@ -82,8 +83,11 @@ pub fn conserve(
         let growth = if before.rest_area > 0.0 { before.area / before.rest_area } else { 1.0 };
         let growth = growth.clamp(1.0, MOST_GROWTH);
         let reflected = scale(visible.reflected * growth, before.reflected);
+        let emitted = scale(visible.emitted * growth, before.emitted);
         light.samples.iter_mut().for_each(|s| s.reflectance *= reflected);
-        light.emission *= scale(visible.emitted * growth, before.emitted);
+        light.emission *= emitted;
+        let emits = light.albedo == Vec3::ZERO;
+        light.concentration *= luminance(if emits { emitted } else { reflected });
     }
     let after = sent_by_lights(scene, lights);
     let objects = visible.iter().zip(after).enumerate().filter(|(_, (visible, _))| visible.area > 0.0);

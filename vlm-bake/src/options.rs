@@ -1,5 +1,7 @@
 //! The knobs of a bake and their presets.
 
+use crate::grid::GridOptions;
+
 /// What a bake costs and how fine it is. Start from [`BakeOptions::preset`] and change what you need.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BakeOptions {
@@ -20,12 +22,8 @@ pub struct BakeOptions {
     /// Points tested per light by `verify`, and the pool from which the samples are drawn. Higher values find smaller
     /// violations; bake time grows in proportion.
     pub tests_per_light: u32,
-    /// Edge of a grid cell in metres; `None` chooses one that suits the scene's extent. Smaller cells have shorter lists and
-    /// take more space.
-    pub cell_size: Option<f32>,
-    /// How far a light reaches in the grid, in multiples of its radius. Higher values lose less far light and lengthen
-    /// the lists with the square of the reach.
-    pub range: f32,
+    /// The static grid.
+    pub grid: GridOptions,
 }
 
 /// Named sets of options.
@@ -71,20 +69,21 @@ impl BakeOptions {
     /// The options of a preset for a scene of that many visible triangles.
     #[must_use]
     pub fn preset(preset: Preset, visible_triangles: usize) -> Self {
-        let (samples, range) = match preset {
-            Preset::Draft => (2, 4.5),
-            Preset::Game => (4, 8.0),
-            Preset::Quality => (16, 16.0),
+        let lights = preset.lights(visible_triangles);
+        let (samples, probes_per_light, rays, near) = match preset {
+            Preset::Draft => (2, 1.5, 256, 0),
+            Preset::Game => (4, 3.0, 1024, 16),
+            Preset::Quality => (16, 2.0, 2048, 40),
         };
+        let probes = (f64::from(lights) * probes_per_light) as u32;
         Self {
             preset,
-            lights: preset.lights(visible_triangles),
+            lights,
             surface_share: 0.6,
             free_error: 2e-4,
             samples,
             tests_per_light: 20,
-            cell_size: None,
-            range,
+            grid: GridOptions { probes, rays, near, cell_size: None },
         }
     }
 }

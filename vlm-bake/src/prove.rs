@@ -1,6 +1,6 @@
 //! Stage 11: tags the lights, assembles the asset, and proves it by what the file will hold.
 
-use vlm_format::{Grid, VlmAsset};
+use vlm_format::VlmAsset;
 
 use crate::correspondence::Light;
 use crate::ground::Ground;
@@ -55,7 +55,6 @@ fn reason(two_sided: bool, pokes_out: bool) -> TagReason {
 pub fn prove(
     scene: &Scene,
     baked: &mut [BakedLight],
-    grid: Option<&Grid>,
     options: &BakeOptions,
     ground: &Ground,
     mut points: Vec<SurfacePoint>,
@@ -64,7 +63,7 @@ pub fn prove(
     let mut round = 0;
     loop {
         let mut tags = tag(scene, patches, baked);
-        let asset = assemble(scene, baked, &tags, grid.cloned(), options);
+        let asset = assemble(scene, baked, &tags, options);
         let count = points.len();
         let mut proof = check(scene, &asset, ground, points);
         round += 1;

@@ -47,11 +47,7 @@ pub fn irradiance_at(scene: &TraceScene<'_>, point: &SurfacePoint, samples: u32,
         tangents: point.normal.any_orthonormal_pair(),
         point,
     };
-    let random = |stream: u64| {
-        let bits = mix((2 * seed + stream).wrapping_add(0x9e37_79b9_7f4a_7c15));
-        (bits as u32, (bits >> 32) as u32)
-    };
-    let (toward_hemisphere, toward_emitters) = (random(0), random(1));
+    let (toward_hemisphere, toward_emitters) = (random_shift(2 * seed), random_shift(2 * seed + 1));
     let mut sum = Vec3::ZERO;
     for i in 0..samples {
         sum += by_direction(scene, &receiver, shifted_hammersley(i, samples, toward_hemisphere));
@@ -115,6 +111,18 @@ fn by_emitter(scene: &TraceScene<'_>, receiver: &Receiver<'_>, random: (f32, f32
 fn emitter_density(scene: &TraceScene<'_>, y: &SurfacePoint, direction: Vec3, distance: f32) -> f32 {
     let cosine = -y.geometric_normal.dot(direction);
     if cosine <= 0.0 { 0.0 } else { scene.emitters.density(y.triangle) * distance * distance / cosine }
+}
+
+/// A random point of the torus.
+fn random_shift(seed: u64) -> (u32, u32) {
+    let bits = mix(seed.wrapping_add(0x9e37_79b9_7f4a_7c15));
+    (bits as u32, (bits >> 32) as u32)
+}
+
+/// `count` directions around +z with density `cos(theta) / pi`, stratified; `seed` chooses them.
+pub fn cosine_directions(count: u32, seed: u64) -> impl Iterator<Item = Vec3> {
+    let shift = random_shift(seed);
+    (0..count).map(move |i| cosine_direction(shifted_hammersley(i, count, shift)))
 }
 
 /// The `i`-th of `count` points of the unit square (Hammersley 1960): stratified in both coordinates at every scale,

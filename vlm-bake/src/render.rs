@@ -5,10 +5,12 @@ use std::time::Instant;
 use glam::{DMat4, Vec3};
 use rayon::prelude::*;
 use serde::Serialize;
-use vlm_format::VlmAsset;
+use vlm_format::{Grid, VlmAsset};
 use vlm_shaders::cpu::gather::{Gathered, Receiver, gather_together};
-use vlm_shaders::cpu::grid::lights_at;
+use vlm_shaders::cpu::gather_static::Frame;
+use vlm_shaders::cpu::grid::leaf_at;
 use vlm_shaders::cpu::inject::inject;
+use vlm_shaders::cpu::refresh::{FarSource, refresh};
 use vlm_shaders::cpu::upload::LightSet;
 
 use crate::gbuffer::GBuffer;
@@ -220,7 +222,7 @@ pub fn gather_by_grid(
         return gather_brute(trace, asset, gbuffer, progress);
     };
     let lit = LitScene::new(trace, asset)?;
-    Ok(lit.gather_lists(gbuffer, progress, |position| lights_at(grid, position)))
+    Ok(lit.gather_static(grid, gbuffer, progress))
 }
 
 /// The virtual lights of an asset after phase 1: what every gathering method starts from.
@@ -294,6 +296,42 @@ impl LitScene {
             let receivers: Vec<Receiver> = pixels.iter().map(|(.., receiver)| *receiver).collect();
             let list = pixels.first().map_or(&[] as &[u32], |(list, ..)| *list);
             gather_together(&self.lights, &self.radiosity, list, &receivers)
+        };
+        let gathered: Vec<Vec<Gathered>> = tasks.par_iter().map(gather).collect();
+        let mut irradiance = vec![Vec3::ZERO; gbuffer.points.len()];
+        let mut pairs_evaluated = 0;
+        for ((_, pixel, _), gathered) in all.iter().zip(gathered.iter().flatten()) {
+            irradiance[*pixel] = gathered.irradiance;
+            pairs_evaluated += gathered.pairs;
+        }
+        let seconds = PhaseSeconds { inject: self.inject_seconds, gather: start.elapsed().as_secs_f64() };
+        let stats = RenderStats { seconds, pairs_evaluated, lights: self.lights.len() as u32 };
+        (irradiance, stats)
+    }
+
+    /// Phase 2 at every pixel by the static grid: far light is refreshed, then pixels of a leaf are gathered together.
+    pub fn gather_static(
+        &self,
+        grid: &Grid,
+        gbuffer: &GBuffer,
+        progress: &dyn Progress,
+    ) -> (Vec<Vec3>, RenderStats) {
+        let start = Instant::now();
+        let sources: Vec<FarSource> = self.lights.geometry.iter().map(FarSource::new).collect();
+        let far = refresh(grid, &sources, &self.radiosity);
+        let frame = Frame { grid, lights: &self.lights, radiosity: &self.radiosity, far: &far };
+        let with_leaf = |(pixel, point): (usize, &Option<SurfacePoint>)| {
+            let point = point.as_ref()?;
+            Some((leaf_at(grid, point.position)?, pixel, self.receiver(point)))
+        };
+        let mut all: Vec<_> = gbuffer.points.par_iter().enumerate().filter_map(with_leaf).collect();
+        all.par_sort_unstable_by_key(|&(leaf, pixel, _)| (leaf, pixel));
+        let tasks: Vec<_> = all.chunk_by(|(a, ..), (b, ..)| a == b).flat_map(|p| p.chunks(PIXELS_TOGETHER)).collect();
+        progress.begin("gather", tasks.len() as u64);
+        let gather = |pixels: &&[(u32, usize, Receiver)]| {
+            progress.advance(1);
+            let receivers: Vec<Receiver> = pixels.iter().map(|(.., receiver)| *receiver).collect();
+            pixels.first().map_or_else(Vec::new, |(leaf, ..)| frame.gather_together(*leaf, &receivers))
         };
         let gathered: Vec<Vec<Gathered>> = tasks.par_iter().map(gather).collect();
         let mut irradiance = vec![Vec3::ZERO; gbuffer.points.len()];

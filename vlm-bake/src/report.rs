@@ -87,12 +87,14 @@ pub struct AreaReport {
 /// The grid in figures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct GridReport {
-    /// Cells of the box, stored or not.
-    pub cells: u64,
-    /// Cells that hold visible surface.
-    pub stored_cells: usize,
-    /// Lights over all lists.
-    pub entries: usize,
+    /// Cells that list probes.
+    pub leaves: usize,
+    /// Probes, on surface and in free space.
+    pub probes: usize,
+    /// Lights over all leaves' lists of near lights.
+    pub near_entries: usize,
+    /// Entries over all rows of far light.
+    pub far_entries: usize,
     /// Bytes in the file.
     pub bytes: usize,
 }

@@ -35,6 +35,12 @@ pub struct BakedLight {
     pub albedo: Vec3,
     /// Radiosity that it emits by itself, lx.
     pub emission: Vec3,
+    /// Index into [`Patches::regions`] of the surface for which it stands; 0 for authored ones.
+    pub region: u32,
+    /// It stands for the back of a two-sided surface.
+    pub back: bool,
+    /// Its radiosity over that of its surface: what it has less in area. 0 for authored ones.
+    pub concentration: f32,
     /// 0 for none.
     pub tag: u32,
     /// Its area before it moved behind its surface, square metres; 0 for authored ones.
@@ -118,7 +124,16 @@ fn finish_light(
     let object = sources.scene.primitives[region.primitive as usize].object;
     let accused = sources.accused[number].clone();
     let rest_area = sources.rest_areas[number];
-    let bare = BakedLight { corners: light.corners, object, rest_area, accused, ..BakedLight::default() };
+    let bare = BakedLight {
+        corners: light.corners,
+        object,
+        region: light.region,
+        back: light.back,
+        concentration: ratio,
+        rest_area,
+        accused,
+        ..BakedLight::default()
+    };
     let finished = colour(bare, &candidates, ratio, count);
     (!finished.samples.is_empty() || finished.emission != Vec3::ZERO).then_some(finished)
 }

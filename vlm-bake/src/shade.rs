@@ -82,7 +82,7 @@ impl<'a> TraceScene<'a> {
     /// The first surface that a light path meets, whichever side it shows.
     #[must_use]
     pub fn path_hit(&self, origin: Vec3, direction: Vec3) -> Option<Hit> {
-        self.bvh.hit_where(origin, direction, f32::INFINITY, |hit| self.is_opaque(hit))
+        self.path_hit_within(origin, direction, f32::INFINITY)
     }
 
     /// True if the side on which `hit` lies reflects and emits.
@@ -145,6 +145,22 @@ impl<'a> TraceScene<'a> {
             return Vec3::ZERO;
         }
         point.albedo * self.direct_irradiance(point.position, point.normal, point.geometric_normal)
+    }
+
+    /// The first surface that a light path meets nearer than `most` (in multiples of `direction`).
+    #[must_use]
+    pub fn path_hit_within(&self, origin: Vec3, direction: Vec3, most: f32) -> Option<Hit> {
+        self.bvh.hit_where(origin, direction, most, |hit| self.is_opaque(hit))
+    }
+
+    /// Whether the front and the back of a triangle reflect and emit.
+    #[must_use]
+    pub fn lit_sides(&self, triangle: u32) -> [bool; 2] {
+        match self.sides(triangle) {
+            Sides::None => [false, false],
+            Sides::Front => [true, false],
+            Sides::Both => [true, true],
+        }
     }
 
     /// True if an opaque surface, whichever side it shows, lies on the ray nearer than `max_distance` (in multiples of

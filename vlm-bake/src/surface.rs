@@ -100,6 +100,13 @@ fn fold((u, v): (f64, f64)) -> (f64, f64) {
     if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) }
 }
 
+/// Weights of the corners of a triangle, the `index`-th of a sequence that is uniform over it.
+#[must_use]
+pub fn uniform_barycentric(index: u64) -> Vec3 {
+    let (u, v) = fold(plastic(index));
+    Vec3::new((1.0 - u - v) as f32, u as f32, v as f32)
+}
+
 /// `count` points spread evenly over one triangle.
 pub fn spread_over([a, b, c]: [DVec3; 3], count: u32) -> impl Iterator<Item = DVec3> {
     (0..u64::from(count)).map(move |index| {

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DMat4, DVec3, Vec3};
 use rustc_hash::FxHashMap;
-use vlm_format::{Grid, Sample, Settings, Vlm, VlmAsset};
+use vlm_format::{Sample, Settings, Vlm, VlmAsset};
 
 use crate::options::BakeOptions;
 use crate::samples::BakedLight;
@@ -19,24 +19,22 @@ pub fn order(lights: &mut [BakedLight]) {
     lights.sort_by_key(|light| (light.object, light.authored));
 }
 
-/// Collects ordered lights, tags and grid into an asset. Lights of an object whose transform has no inverse are left out.
+/// Collects ordered lights and tags into an asset without a grid. Lights of an object whose transform has no inverse are left out.
 #[must_use]
 pub fn assemble(
     scene: &Scene,
     lights: &[BakedLight],
     tags: &Tags,
-    grid: Option<Grid>,
     options: &BakeOptions,
 ) -> VlmAsset {
     let (primitive_tags, triangle_tags) = tags.of_primitives(scene);
     let mut asset = VlmAsset {
         generator: GENERATOR.to_owned(),
-        settings: settings(options, grid.as_ref()),
+        settings: settings(options),
         primitive_tags,
         triangle_tags,
         node_tags: tags.nodes.clone(),
         sample_starts: vec![0],
-        grid,
         ..VlmAsset::default()
     };
     let mut ids: FxHashMap<String, u32> = FxHashMap::default();
@@ -52,12 +50,14 @@ pub fn assemble(
     asset
 }
 
-fn settings(options: &BakeOptions, grid: Option<&Grid>) -> Settings {
+fn settings(options: &BakeOptions) -> Settings {
     Settings {
         preset: options.preset.name().to_owned(),
         lights: options.lights,
-        cell_size: grid.map_or(0.0, |g| g.cell_size),
-        range: options.range,
+        cell_size: options.grid.cell_size.unwrap_or(0.0),
+        probes: options.grid.probes,
+        rays: options.grid.rays,
+        near: options.grid.near,
         samples: options.samples,
     }
 }

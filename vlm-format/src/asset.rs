@@ -3,6 +3,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use crate::grid::Grid;
 use crate::tags::TriangleTags;
 
 /// All the Virtual Light Meshes of one glTF file, with the static grid over them.
@@ -40,7 +41,7 @@ pub struct VlmAsset {
     /// Tags of visible nodes as wholes, `(node, tag)`, sorted, tag never 0. They win over those of the node's primitives,
     /// which other nodes may share. See [`VlmAsset::tag_of`].
     pub node_tags: Vec<(u32, u32)>,
-    /// The static grid of light lists, in world space, or `None` when the asset has none.
+    /// The static grid, in world space, or `None` when the asset has none.
     pub grid: Option<Grid>,
 }
 
@@ -73,23 +74,6 @@ pub struct Sample {
     pub reflectance: Vec3,
 }
 
-/// Light lists over the cells that hold visible surface.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Grid {
-    /// World-space minimum corner, metres.
-    pub origin: Vec3,
-    /// Edge of a cubic cell, metres, above 0.
-    pub cell_size: f32,
-    /// Cells along x, y, z; their product is below 2^31.
-    pub dimensions: [u32; 3],
-    /// The stored cells, ascending: `x + dimensions.x * (y + dimensions.y * z)`.
-    pub cells: Vec<u32>,
-    /// `cells.len() + 1` offsets into `entries`.
-    pub starts: Vec<u32>,
-    /// Light numbers, ascending within a cell.
-    pub entries: Vec<u32>,
-}
-
 /// The options of a bake, kept in the file so that a rebake can repeat them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
@@ -98,10 +82,14 @@ pub struct Settings {
     pub preset: String,
     /// Asked number of lights for the whole scene.
     pub lights: u32,
-    /// Edge of a grid cell, metres.
+    /// Edge of the grid's coarsest cells, metres.
     pub cell_size: f32,
-    /// How far a light reaches in the grid, in multiples of its radius.
-    pub range: f32,
+    /// Asked number of probes on surface.
+    pub probes: u32,
+    /// Directions traced from each probe.
+    pub rays: u32,
+    /// The most near lights of a probe.
+    pub near: u32,
     /// Samples per light.
     pub samples: u32,
 }

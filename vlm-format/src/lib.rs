@@ -16,6 +16,7 @@ mod codec;
 mod container;
 mod accessor;
 mod asset;
+mod grid;
 mod tags;
 mod validate;
 mod nodes;
@@ -26,8 +27,9 @@ mod package;
 mod write;
 mod save;
 
-pub use asset::{Grid, Sample, Settings, Vlm, VlmAsset};
+pub use asset::{Sample, Settings, Vlm, VlmAsset};
 pub use container::{GltfFile, Kind};
+pub use grid::{FULL_VISIBILITY, Grid, Leaf, MOST_PROBES, NearLight, Probe, Row, RowWriter};
 pub use error::{Code, Error, Issue, Severity, Stale};
 pub use package::{Container, OutputFile, Target};
 pub use read::{read_vlm, read_vlm_unchecked};

@@ -3,11 +3,12 @@
 use glam::Vec3;
 use serde_json::Value;
 
-use crate::asset::{Grid, Sample, Settings, Vlm, VlmAsset};
-use crate::check::{self, array, index};
+use crate::asset::{Sample, Settings, Vlm, VlmAsset};
+use crate::check::{self, array, count, index};
 use crate::container::GltfFile;
 use crate::digest::{self, Source};
 use crate::error::{Error, Issue, Stale};
+use crate::grid::{Grid, Probe};
 use crate::nodes;
 use crate::strip::EXTENSION;
 use crate::tags::{TriangleTags, elements};
@@ -145,9 +146,29 @@ impl<'a> Reader<'a> {
             cell_size: json.get("cellSize").and_then(Value::as_f64).unwrap_or(f64::NAN) as f32,
             dimensions: dimensions.collect::<Vec<u32>>().try_into().unwrap_or_default(),
             cells: self.integers("grid", "cells"),
-            starts: self.integers("grid", "starts"),
-            entries: self.integers("grid", "entries"),
+            leaves: self.records("leaves"),
+            leaf_probes: self.integers("grid", "leafProbes"),
+            near: self.records("near"),
+            probes: self.probes(),
+            surface_probes: count(json, "surfaceProbes").and_then(|n| u32::try_from(n).ok()).unwrap_or(u32::MAX),
+            row_starts: self.integers("grid", "rowStarts"),
+            rows: self.integers("grid", "rows"),
         }
+    }
+
+    /// Structs of unsigned integers; a torn one at the end is left out.
+    fn records<T: bytemuck::Pod>(&mut self, key: &str) -> Vec<T> {
+        from_words(&self.integers("grid", key))
+    }
+
+    fn probes(&mut self) -> Vec<Probe> {
+        let read = |file: &GltfFile, accessor| {
+            let values = file.read_vec4(accessor)?;
+            let bytes = values.iter().flat_map(|value| value.to_array()).flat_map(f32::to_le_bytes).collect();
+            Ok((values, bytes))
+        };
+        let vectors = self.elements(&self.place("grid", "probes"), "VEC4", read);
+        from_words(bytemuck::cast_slice(&vectors))
     }
 
     /// Tags of the primitives whose triangles differ, in the order of the file.
@@ -329,4 +350,10 @@ fn own_of_primitives(file: &GltfFile) -> impl Iterator<Item = (u32, u32, &Value)
         let primitives = array(mesh, "/primitives").iter().enumerate();
         primitives.filter_map(move |(p, primitive)| Some((m as u32, p as u32, own(primitive)?)))
     })
+}
+
+/// Structs of whole words, one after the other; a torn one at the end is left out.
+fn from_words<T: bytemuck::Pod>(words: &[u32]) -> Vec<T> {
+    let structs = words.chunks_exact(size_of::<T>() / size_of::<u32>());
+    structs.map(|words| bytemuck::pod_read_unaligned(bytemuck::cast_slice(words))).collect()
 }

@@ -5,11 +5,12 @@ use std::collections::BTreeMap;
 use glam::Vec3;
 use serde_json::{Map, Value, json};
 
-use crate::asset::{Grid, Sample, VlmAsset};
+use crate::asset::{Sample, VlmAsset};
 use crate::check::array;
 use crate::container::GltfFile;
 use crate::digest::{self, Source};
 use crate::error::Error;
+use crate::grid::Grid;
 use crate::package::{OutputFile, Parts, Target};
 use crate::strip::{EXTENSION, strip};
 use crate::validate::validate_in;
@@ -115,9 +116,15 @@ impl Arrays {
         json.insert(String::from("origin"), json!(grid.origin.to_array()));
         json.insert(String::from("cellSize"), json!(grid.cell_size));
         json.insert(String::from("dimensions"), json!(grid.dimensions));
+        json.insert(String::from("surfaceProbes"), json!(grid.surface_probes));
         self.integers(&mut json, "cells", &grid.cells);
-        self.integers(&mut json, "starts", &grid.starts);
-        self.integers(&mut json, "entries", &grid.entries);
+        self.integers(&mut json, "leaves", bytemuck::cast_slice(&grid.leaves));
+        self.integers(&mut json, "leafProbes", &grid.leaf_probes);
+        self.integers(&mut json, "near", bytemuck::cast_slice(&grid.near));
+        let probes: Vec<u8> = grid.probes.iter().flat_map(|p| bytemuck::cast::<_, [f32; 16]>(*p)).flat_map(f32::to_le_bytes).collect();
+        self.push(&mut json, "probes", "VEC4", 5126, 4 * grid.probes.len(), &probes);
+        self.integers(&mut json, "rowStarts", &grid.row_starts);
+        self.integers(&mut json, "rows", &grid.rows);
         Value::Object(json)
     }
 

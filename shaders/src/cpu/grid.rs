@@ -1,67 +1,76 @@
-//! The lights that a point of world space looks at.
+//! The leaf of the static grid that holds a point, and the weights of its probes there.
 
 use glam::Vec3;
-use vlm_format::Grid;
+use vlm_format::{Grid, MOST_PROBES};
 
-/// The lights of the cell that holds `x`, ascending. Empty outside the grid and in cells that are not stored.
-#[must_use]
-pub fn lights_at(grid: &Grid, x: Vec3) -> &[u32] {
-    let slot = cell_number(grid, x).and_then(|cell| grid.cells.binary_search(&cell).ok());
-    slot.and_then(|slot| grid.starts.get(slot).zip(grid.starts.get(slot + 1)))
-        .and_then(|(&start, &end)| grid.entries.get(start as usize..end as usize))
-        .unwrap_or(&[])
-}
+use super::gather::Receiver;
 
-/// `x + dimensions.x * (y + dimensions.y * z)` of the cell that holds `p`. The grid's maximum faces belong to it.
+/// The most levels below the coarsest: bounds the descent, whatever a file holds.
+const DEEPEST: u32 = 24;
+
+/// The leaf that holds `x`; `None` outside the grid and where nothing is stored.
 #[must_use]
-pub fn cell_number(grid: &Grid, p: Vec3) -> Option<u32> {
-    let cell = (p - grid.origin) / grid.cell_size;
-    let mut index = [0; 3];
+pub fn leaf_at(grid: &Grid, x: Vec3) -> Option<u32> {
+    let place = (x - grid.origin) / grid.cell_size;
+    let mut index = [0_u32; 3];
+    let mut within = Vec3::ZERO;
     for axis in 0..3 {
-        let (coordinate, cells) = (cell[axis], grid.dimensions[axis]);
-        // NaN fails both comparisons.
+        let (coordinate, cells) = (place[axis], grid.dimensions[axis]);
+        // NaN fails both comparisons. The grid's maximum faces belong to it.
         if !(coordinate >= 0.0 && coordinate <= cells as f32) {
             return None;
         }
         index[axis] = (coordinate as u32).min(cells.checked_sub(1)?);
+        within[axis] = coordinate - index[axis] as f32;
     }
     let [x, y, z] = index;
     let [nx, ny, _] = grid.dimensions;
-    z.checked_mul(ny)?.checked_add(y)?.checked_mul(nx)?.checked_add(x)
+    let mut at = z.checked_mul(ny)?.checked_add(y)?.checked_mul(nx)?.checked_add(x)?;
+    for _ in 0..DEEPEST {
+        let cell = *grid.cells.get(at as usize)?;
+        if cell % 2 == 1 {
+            return Some(cell / 2);
+        }
+        if cell == 0 {
+            return None;
+        }
+        within *= 2.0;
+        let upper = within.cmpge(Vec3::ONE);
+        within -= Vec3::select(upper, Vec3::ONE, Vec3::ZERO);
+        at = cell / 2 + upper.bitmask();
+    }
+    None
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// The probes that a point of a leaf looks at, and how much each counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Blend {
+    /// Index into [`Grid::leaf_probes`] of the first.
+    pub first: u32,
+    /// Number of probes.
+    pub count: u32,
+    /// Their weights, which sum to 1 (all 0 where no probe reaches).
+    pub weights: [f32; MOST_PROBES],
+}
 
-    fn grid() -> Grid {
-        Grid {
-            origin: Vec3::splat(-1.0),
-            cell_size: 0.5,
-            dimensions: [4, 3, 2],
-            cells: vec![1, 23],
-            starts: vec![0, 2, 3],
-            entries: vec![4, 7, 9],
-        }
+/// Weights of a leaf's probes on surface for a receiver.
+#[must_use]
+pub fn blend(grid: &Grid, leaf: u32, receiver: &Receiver) -> Blend {
+    let mut blend = Blend::default();
+    let Some(lists) = grid.leaves.get(leaf as usize) else { return blend };
+    blend.first = lists.probes;
+    blend.count = (lists.free_probes - lists.probes).min(MOST_PROBES as u32);
+    let mut sum = 0.0;
+    for i in 0..blend.count {
+        let probe = grid.leaf_probes.get((blend.first + i) as usize);
+        let Some(probe) = probe.and_then(|&probe| grid.probes.get(probe as usize)) else { continue };
+        let weight =
+            probe.normal_weight(receiver.normal) * probe.place_weight(probe.local(receiver.position));
+        blend.weights[i as usize] = weight;
+        sum += weight;
     }
-
-    #[test]
-    fn stored_cells_are_found() {
-        let grid = grid();
-        assert_eq!(lights_at(&grid, Vec3::new(-0.4, -0.9, -0.9)), [4, 7]);
-        assert_eq!(lights_at(&grid, Vec3::new(1.0, 0.5, 0.0)), [9], "the far corner");
-        assert!(lights_at(&grid, Vec3::new(0.2, -0.9, -0.9)).is_empty(), "not stored");
-        assert!(lights_at(&grid, Vec3::new(-1.01, 0.0, -0.5)).is_empty(), "outside");
-        assert!(lights_at(&grid, Vec3::NAN).is_empty());
+    if sum > 0.0 {
+        blend.weights.iter_mut().for_each(|weight| *weight /= sum);
     }
-
-    #[test]
-    fn broken_grids_hold_nothing() {
-        let empty = Grid::default();
-        assert!(lights_at(&empty, Vec3::ZERO).is_empty());
-        let torn = Grid { starts: vec![0, 99], ..grid() };
-        assert!(lights_at(&torn, Vec3::new(-0.4, -0.9, -0.9)).is_empty());
-        let huge = Grid { dimensions: [u32::MAX; 3], ..grid() };
-        assert!(lights_at(&huge, Vec3::splat(1e9)).is_empty());
-    }
+    blend
 }

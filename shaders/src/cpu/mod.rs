@@ -3,7 +3,9 @@
 pub mod upload;
 pub mod punctual;
 pub mod inject;
-pub mod grid;
 pub mod form_factor;
+pub mod refresh;
+pub mod grid;
 pub mod gather;
+pub mod gather_static;
 pub mod resolve;

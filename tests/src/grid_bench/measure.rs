@@ -3,11 +3,11 @@
 use std::time::Instant;
 
 use glam::Vec3;
-use vlm_bake::grid::grid;
 use vlm_bake::scene::Scene;
 
 use super::GridBenchError;
 use super::lights::{Lights, lights, load_scene};
+use super::scatter::light_lists;
 use super::row::{OURS, Row, THESIS};
 use crate::device::processor;
 use crate::random;
@@ -154,7 +154,7 @@ impl Measurement<'_> {
     fn ours(&self, lights: &Lights, common: Row) -> Row {
         let size = cell_size(self.scene, common.cells_per_axis);
         let start = Instant::now();
-        let grid = grid(self.scene, &lights.corners, Some(size), self.options.range);
+        let grid = light_lists(self.scene, &lights.corners, Some(size), self.options.range);
         let seconds = start.elapsed().as_secs_f64();
         let Some(grid) = grid else { return Row { seconds, ..common } };
         let words = grid.cells.len() + grid.starts.len() + grid.entries.len();
@@ -266,7 +266,7 @@ mod tests {
         let scene = load_scene("room", 3_000).unwrap();
         let lights = lights("room", &scene, 100).unwrap();
         for cells in [1, 2, 16, 33, 100, 256] {
-            let grid = grid(&scene, &lights.corners, Some(cell_size(&scene, cells)), 1.0).unwrap();
+            let grid = light_lists(&scene, &lights.corners, Some(cell_size(&scene, cells)), 1.0).unwrap();
             assert_eq!(grid.dimensions.into_iter().max(), Some(cells));
         }
     }

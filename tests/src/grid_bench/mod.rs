@@ -7,6 +7,7 @@
 
 pub mod row;
 mod lights;
+pub mod scatter;
 mod measure;
 mod table;
 mod figure;

@@ -57,8 +57,7 @@ impl AreaLights {
 /// Bytes of an asset's grid.
 #[must_use]
 pub fn grid_bytes(asset: &VlmAsset) -> u64 {
-    let words = |grid: &vlm_format::Grid| grid.cells.len() + grid.starts.len() + grid.entries.len();
-    asset.grid.as_ref().map_or(0, |grid| (words(grid) * size_of::<u32>()) as u64)
+    asset.grid.as_ref().map_or(0, |grid| grid.byte_len() as u64)
 }
 
 /// The rays that [`TraceScene::direct_irradiance`] traces: one for each light in front of the surface.

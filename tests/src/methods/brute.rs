@@ -34,7 +34,7 @@ impl Method for Brute {
     }
 
     fn prepare(&self, stage: &Stage<'_>) -> Result<Box<dyn Prepared>, MethodError> {
-        let lights = AreaLights::new(stage, stage.baked(Preset::Game, self.lights)?)?;
+        let lights = AreaLights::new(stage, stage.baked(&stage.without_grid(Preset::Game, self.lights))?)?;
         Ok(Box::new(PreparedBrute { lights }))
     }
 }

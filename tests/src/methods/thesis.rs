@@ -58,7 +58,7 @@ impl Method for Thesis {
     }
 
     fn prepare(&self, stage: &Stage<'_>) -> Result<Box<dyn Prepared>, MethodError> {
-        let lights = AreaLights::new(stage, stage.baked(Preset::Game, self.lights)?)?;
+        let lights = AreaLights::new(stage, stage.baked(&stage.without_grid(Preset::Game, self.lights))?)?;
         let (low, high) = stage.bounds();
         let grid = ThesisGrid::build(&lights.world.geometry, low, high, &self.options);
         Ok(Box::new(PreparedThesis { lights, grid }))

@@ -3,6 +3,9 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
+use vlm_bake::scene::{Camera, Projection, look as look_from};
+
 use crate::assets;
 
 /// Size of the pictures of scenes in the repository, pixels: a run of all methods takes less than 5 minutes on two cores.
@@ -26,6 +29,24 @@ pub fn file(name: &str) -> Option<PathBuf> {
 #[must_use]
 pub fn default_size(name: &str) -> (u32, u32) {
     if own_file(name).exists() { ROOM_SIZE } else { HALL_SIZE }
+}
+
+/// Cameras beside those of a scene's file: Sponza's lower arcade and upper gallery.
+#[must_use]
+pub fn more_cameras(name: &str) -> Vec<Camera> {
+    let look = |name: &str, from: DVec3, to: DVec3| Camera {
+        name: name.to_owned(),
+        world_from_view: look_from(from, (from - to).normalize_or_zero()),
+        projection: Projection::Perspective(1.0),
+    };
+    if name == "sponza" {
+        vec![
+            look("arcade", DVec3::new(-9.0, 1.8, 4.4), DVec3::new(4.0, 1.6, 4.2)),
+            look("gallery", DVec3::new(9.0, 6.0, -4.6), DVec3::new(-4.0, 5.6, -4.2)),
+        ]
+    } else {
+        Vec::new()
+    }
 }
 
 fn own_folder() -> PathBuf {

@@ -273,8 +273,7 @@ fn sizes(asset: &VlmAsset) -> [(&'static str, u64); 4] {
     let lights = numbers(asset.positions.len() + asset.triangles.len(), 0);
     let colours = numbers(asset.albedo.len() + asset.emission.len(), asset.tags.len());
     let samples = numbers(3 * asset.samples.len(), asset.sample_starts.len());
-    let grid =
-        asset.grid.as_ref().map_or(0, |g| numbers(0, g.cells.len() + g.starts.len() + g.entries.len()));
+    let grid = asset.grid.as_ref().map_or(0, |grid| grid.byte_len() as u64);
     [
         ("lights: geometry", lights),
         ("lights: colours and tags", colours),

@@ -289,8 +289,9 @@ fn view_direction(setting: Setting) -> DVec3 {
     }
 }
 
-/// At `eye`, looking along `-backward`, upright.
-pub(crate) fn look(eye: DVec3, backward: DVec3) -> DMat4 {
+/// The view from `eye` along `-backward` (a unit vector), upright: `world_from_view`.
+#[must_use]
+pub fn look(eye: DVec3, backward: DVec3) -> DMat4 {
     let right = DVec3::Y.cross(backward).try_normalize().unwrap_or(DVec3::X);
     let up = backward.cross(right);
     DMat4::from_cols(right.extend(0.0), up.extend(0.0), backward.extend(0.0), eye.extend(1.0))

@@ -217,6 +217,6 @@ mod defaults;
 mod tests;
 
 pub use authored::Volume;
-pub(crate) use defaults::look;
+pub use defaults::look;
 pub use load::{Error, LoadOptions, load};
 pub use surface::Surface;

@@ -1,12 +1,13 @@
 //! The invariants of a [`VlmAsset`], checked before it is written and after it is read.
 
+mod grid;
 mod tags;
 
 use std::collections::HashSet;
 
 use glam::{DVec3, Vec3};
 
-use crate::asset::{Grid, VlmAsset};
+use crate::asset::VlmAsset;
 use crate::check::array;
 use crate::container::GltfFile;
 use crate::error::{Code, Issue};
@@ -35,7 +36,7 @@ pub fn validate(asset: &VlmAsset) -> Vec<Issue> {
         tags::tags(asset, &mut issues);
         settings(asset, &mut issues);
         if let Some(grid) = &asset.grid {
-            check_grid(grid, asset.triangles.len(), &mut issues);
+            grid::grid(grid, asset.triangles.len(), &mut issues);
         }
     }
     issues.0
@@ -203,51 +204,15 @@ fn check_starts(starts: &[u32], length: usize, pointer: &str, issues: &mut Issue
 
 fn settings(asset: &VlmAsset, issues: &mut Issues) {
     let settings = &asset.settings;
-    let finite = settings.cell_size.is_finite() && settings.range.is_finite();
+    let finite = settings.cell_size.is_finite();
     issues.check(finite, Code::VlmNumber, "/settings", || String::from("a number is not finite"));
-}
-
-fn check_grid(grid: &Grid, lights: usize, issues: &mut Issues) {
-    let positive = grid.origin.is_finite() && grid.cell_size.is_finite() && grid.cell_size > 0.0;
-    issues.check(positive, Code::VlmNumber, "/grid", || {
-        String::from("origin or cell size is not finite, or no cell has a size")
-    });
-
-    let total = grid.dimensions.iter().try_fold(1_u64, |product, &size| product.checked_mul(u64::from(size)));
-    let total = total.filter(|&total| total < 1 << 31);
-    issues.check(total.is_some(), Code::VlmRange, "/grid/dimensions", || {
-        format!("{:?} has 2^31 cells or more", grid.dimensions)
-    });
-
-    let ascending = grid.cells.is_sorted_by(|a, b| a < b);
-    let inside = grid.cells.last().is_none_or(|&last| u64::from(last) < total.unwrap_or(0));
-    issues.check(ascending && inside, Code::VlmOrder, "/grid/cells", || {
-        String::from("not ascending, or outside of the grid")
-    });
-
-    let lengths_fit = grid.starts.len() == grid.cells.len() + 1;
-    issues.check(lengths_fit, Code::VlmLength, "/grid/starts", || {
-        format!("{} offsets for {} cells", grid.starts.len(), grid.cells.len())
-    });
-    check_starts(&grid.starts, grid.entries.len(), "/grid/starts", issues);
-    issues.check_all(&grid.entries, Code::VlmIndex, "/grid/entries", "there is no such light", |&light| {
-        (light as usize) < lights
-    });
-    let unsorted = |range: &[u32]| {
-        let list = grid.entries.get(range[0] as usize..range[1] as usize);
-        !list.is_none_or(|list| list.is_sorted_by(|a, b| a < b))
-    };
-    if let Some(cell) = grid.starts.windows(2).position(unsorted) {
-        issues.check(false, Code::VlmOrder, &format!("/grid/cells/{cell}"), || {
-            String::from("its lights are not ascending")
-        });
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::asset::{Sample, Vlm};
+    use crate::grid::Grid;
     use crate::tags::TriangleTags;
 
     /// Two lights of one node, one sample each, in a grid of one cell.
@@ -266,14 +231,7 @@ mod tests {
             albedo: vec![Vec3::ONE; 2],
             sample_starts: vec![0, 1, 2],
             samples: vec![sample; 2],
-            grid: Some(Grid {
-                origin: Vec3::ZERO,
-                cell_size: 1.0,
-                dimensions: [1, 1, 1],
-                cells: vec![0],
-                starts: vec![0, 2],
-                entries: vec![0, 1],
-            }),
+            grid: Some(grid::tests::two_lights()),
             ..VlmAsset::default()
         }
     }
@@ -330,14 +288,9 @@ mod tests {
             (Code::VlmOrder, "/node_tags", |a| a.node_tags = vec![(2, 1), (1, 1)]),
             (Code::VlmOrder, "/node_tags", |a| a.node_tags = vec![(2, 1), (2, 3)]),
             (Code::VlmNumber, "/node_tags/1", |a| a.node_tags = vec![(1, 1), (2, 0)]),
-            (Code::VlmNumber, "/settings", |a| a.settings.range = f32::NAN),
+            (Code::VlmNumber, "/settings", |a| a.settings.cell_size = f32::NAN),
             (Code::VlmNumber, "/grid", |a| grid(a).cell_size = 0.0),
             (Code::VlmRange, "/grid/dimensions", |a| grid(a).dimensions = [1 << 16, 1 << 15, 1]),
-            (Code::VlmOrder, "/grid/cells", |a| grid(a).cells[0] = 1),
-            (Code::VlmLength, "/grid/starts", |a| grid(a).starts = vec![0, 0, 2]),
-            (Code::VlmOrder, "/grid/starts", |a| grid(a).starts[1] = 1),
-            (Code::VlmIndex, "/grid/entries/1", |a| grid(a).entries[1] = 2),
-            (Code::VlmOrder, "/grid/cells/0", |a| grid(a).entries = vec![1, 0]),
         ];
         for (code, pointer, spoil) in cases {
             let mut asset = valid();

@@ -5,6 +5,7 @@ mod report;
 mod pareto;
 mod grid;
 mod bake;
+mod breakdown;
 mod clearance;
 mod output;
 
@@ -35,6 +36,8 @@ enum Command {
     /// One bake, in the process whose memory `bake` measures
     #[command(hide = true)]
     BakeChild(bake::ChildArgs),
+    /// What limits the static grid's accuracy, scene by scene
+    Breakdown(breakdown::BreakdownArgs),
     /// How well lights hide behind their surface, over files and budgets
     Clearance(clearance::ClearanceArgs),
     /// Form factors of a file of cases, or the stress test
@@ -51,6 +54,7 @@ fn main() -> ExitCode {
         Command::Grid(args) => grid::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Bake(args) => bake::run(&args).map(|()| ExitCode::SUCCESS),
         Command::BakeChild(args) => bake::run_child(&args).map(|()| ExitCode::SUCCESS),
+        Command::Breakdown(args) => breakdown::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Clearance(args) => clearance::run(&args).map(|()| ExitCode::SUCCESS),
         Command::FormFactor(args) => command::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Kernel(args) => kernel::run(&args).map(|()| ExitCode::SUCCESS),

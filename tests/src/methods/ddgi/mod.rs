@@ -16,7 +16,6 @@ use std::time::Instant;
 
 use glam::Vec3;
 use rayon::prelude::*;
-use vlm_bake::grid::DEFAULT_CELLS;
 use vlm_bake::render::PhaseSeconds;
 
 use super::Entry;
@@ -28,10 +27,13 @@ use update::{ProbeLight, RaySet};
 pub const ENTRY: Entry =
     Entry { name: "ddgi", sweep, proof: || Box::new(Ddgi { cells: 12.0, rays: 512 }), tolerance: 0.05 };
 
+/// Cells along the longest axis in the middle of the sweep.
+const DEFAULT_CELLS: f32 = 24.0;
+
 fn sweep(_stage: &Stage<'_>) -> Vec<Box<dyn Method>> {
     let mut methods: Vec<Box<dyn Method>> = Vec::new();
     // The last has its probes where the baker's grid has its corners.
-    let ours = DEFAULT_CELLS as f32;
+    let ours = DEFAULT_CELLS;
     for cells in [ours / 4.0, ours / 2.0, ours] {
         for rays in [64, 256] {
             methods.push(Box::new(Ddgi { cells, rays }));

@@ -122,7 +122,7 @@ fn load_scene(file: &GltfFile, bars: &Bars) -> Result<Scene, CliError> {
 fn options(args: &BakeArgs, scene: &Scene) -> BakeOptions {
     let mut options = BakeOptions::preset(args.preset.into(), scene.triangles.len());
     options.lights = args.lights.unwrap_or(options.lights);
-    options.cell_size = args.cell;
+    options.grid.cell_size = args.cell;
     options
 }
 
@@ -200,10 +200,11 @@ fn summarize(args: &BakeArgs, report: &Report, preview: Option<&str>) -> Result<
     let share = 100.0 * report.area.tagged_m2.max(0.0) / report.area.lights_m2.max(f64::MIN_POSITIVE);
     lines.push(format!("tags      {} ({share:.1} % of the lights' area)", report.tags.len()));
     lines.push(format!(
-        "grid      {} of {} cells stored, {} entries, {:.1} kB",
-        report.grid.stored_cells,
-        report.grid.cells,
-        report.grid.entries,
+        "grid      {} probes in {} cells; {} near lights, {} far; {:.1} kB",
+        report.grid.probes,
+        report.grid.leaves,
+        report.grid.near_entries,
+        report.grid.far_entries,
         report.grid.bytes as f64 / 1e3
     ));
     lines.push(format!("time      {:.2} s", report.seconds.values().sum::<f64>()));

@@ -60,10 +60,10 @@ struct VlmContent {
 struct GridContent {
     cell_size_m: f32,
     dimensions: [u32; 3],
-    cells: u64,
-    stored_cells: usize,
-    entries: usize,
-    longest_list: u32,
+    leaves: usize,
+    probes: usize,
+    near_entries: usize,
+    far_entries: u32,
     bytes: usize,
 }
 
@@ -153,26 +153,26 @@ impl VlmContent {
 
 impl GridContent {
     fn of(grid: &Grid) -> Self {
-        let lengths = grid.starts.windows(2).map(|ends| ends[1] - ends[0]);
         Self {
             cell_size_m: grid.cell_size,
             dimensions: grid.dimensions,
-            cells: grid.dimensions.iter().map(|&d| u64::from(d)).product(),
-            stored_cells: grid.cells.len(),
-            entries: grid.entries.len(),
-            longest_list: lengths.max().unwrap_or(0),
-            bytes: size_of::<u32>() * (grid.cells.len() + grid.starts.len() + grid.entries.len()),
+            leaves: grid.leaves.len().saturating_sub(1),
+            probes: grid.probes.len(),
+            near_entries: grid.near.len(),
+            far_entries: grid.row_starts.last().copied().unwrap_or(0),
+            bytes: grid.byte_len(),
         }
     }
 
     fn line(&self) -> String {
         let [x, y, z] = self.dimensions;
         format!(
-            "grid      {x} x {y} x {z} cells of {} m, {} stored, {} entries, at most {} lights a cell, {:.1} kB",
+            "grid      {x} x {y} x {z} cells of {} m, {} leaves, {} probes, {} near lights, {} far, {:.1} kB",
             self.cell_size_m,
-            self.stored_cells,
-            self.entries,
-            self.longest_list,
+            self.leaves,
+            self.probes,
+            self.near_entries,
+            self.far_entries,
             self.bytes as f64 / 1e3
         )
     }

@@ -1,21 +1,36 @@
-//! Stage 9: which lights reach which cell, as compact lists over the cells that hold visible surface.
+//! Lights scattered into the cells that they reach, as compact lists over the cells that hold visible surface: the thesis' lists, built
+//! the way the baker scatters probes.
 //!
 //! A light reaches the half ball in front of it whose radius is `range` times its own (Aquotte 2017, the active hemisphere).
 //! Aquotte tests every cell against every light and pads lists of one length; here each light is scattered into
 //! the few cells that it reaches, and lists are as long as they need be.
 
-use glam::{DVec3, IVec3, Vec3};
+use glam::{DVec3, IVec3};
 use rayon::prelude::*;
-use vlm_format::Grid;
 
-use crate::scene::Scene;
-use crate::topology::Lists;
+use vlm_bake::scene::Scene;
+use vlm_bake::topology::{Lists, cross_of};
 
 /// The most cells along the longest axis: bounds the look-up table at 64 MiB.
 const MOST_CELLS: f64 = 256.0;
 
 /// Cells along the longest axis where the user names no size: about the size of a piece of furniture in a room, of a bay in a hall.
 pub const DEFAULT_CELLS: f64 = 24.0;
+
+/// Lists of lights over the cells that hold surface.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LightLists {
+    /// Edge of a cell, metres.
+    pub cell_size: f32,
+    /// Cells along x, y, z.
+    pub dimensions: [u32; 3],
+    /// The stored cells, ascending.
+    pub cells: Vec<u32>,
+    /// One more than cells: offsets into `entries`.
+    pub starts: Vec<u32>,
+    /// Numbers of lights, ascending within a cell.
+    pub entries: Vec<u32>,
+}
 
 /// A cubic lattice over a box.
 struct Lattice {
@@ -62,15 +77,14 @@ impl Lattice {
 
 /// Builds the grid over lights with these world-space corners; `None` without lights.
 #[must_use]
-pub fn grid(scene: &Scene, lights: &[[DVec3; 3]], cell_size: Option<f32>, range: f32) -> Option<Grid> {
+pub fn light_lists(scene: &Scene, lights: &[[DVec3; 3]], cell_size: Option<f32>, range: f32) -> Option<LightLists> {
     if lights.is_empty() {
         return None;
     }
     let lattice = Lattice::over(scene.bounds()?, cell_size);
     let cells = surface_cells(scene, &lattice);
     let lists = scatter(lights, &lattice, &cells, f64::from(range));
-    Some(Grid {
-        origin: lattice.origin.as_vec3(),
+    Some(LightLists {
         cell_size: lattice.size as f32,
         dimensions: lattice.dimensions,
         cells,
@@ -116,7 +130,7 @@ fn scatter(lights: &[[DVec3; 3]], lattice: &Lattice, cells: &[u32], range: f64) 
 /// The stored cells (as indices into `cells`) that the half ball in front of a light touches.
 fn reached_cells(corners: [DVec3; 3], lattice: &Lattice, cells: &[u32], range: f64) -> Vec<u32> {
     let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
-    let normal = crate::topology::cross_of(corners).normalize_or_zero();
+    let normal = cross_of(corners).normalize_or_zero();
     let radius = range * corners.iter().map(|v| v.distance(centre)).fold(0.0, f64::max);
     lattice
         .between(centre - radius, centre + radius)
@@ -130,12 +144,3 @@ fn reached_cells(corners: [DVec3; 3], lattice: &Lattice, cells: &[u32], range: f
         .collect()
 }
 
-impl Scene {
-    /// The box around all visible triangles in world space, or `None` without triangles.
-    #[must_use]
-    pub fn bounds(&self) -> Option<[DVec3; 2]> {
-        let used = self.triangles.iter().flatten().map(|&v| self.positions[v as usize]);
-        let (low, high) = used.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
-        low.is_finite().then(|| [low.as_dvec3(), high.as_dvec3()])
-    }
-}

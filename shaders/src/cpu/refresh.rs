@@ -1,0 +1,101 @@
+//! The far light of each probe, from the frame's radiosities: to be done again only where lights changed.
+
+use glam::Vec3;
+use rayon::prelude::*;
+use vlm_format::{Grid, Probe};
+
+use super::form_factor::LightGeometry;
+
+/// The least cosine to the normal by which a light's direction is used: lower values follow normals that lean toward grazing light
+/// more closely, and make its noise count more.
+const LEAST_COSINE: f32 = 0.2;
+
+/// A light as probes see it from afar.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct FarSource {
+    /// Middle of the light, metres.
+    pub centroid: Vec3,
+    /// Not used.
+    pub padding: f32,
+    /// Unit normal.
+    pub normal: Vec3,
+    /// Not used.
+    pub padding_2: f32,
+}
+
+impl FarSource {
+    /// Of a light.
+    #[must_use]
+    pub fn new(light: &LightGeometry) -> Self {
+        let [a, b, c] = light.corners();
+        Self { centroid: (a + b + c) / 3.0, normal: light.normal.normalize_or_zero(), ..Self::default() }
+    }
+}
+
+/// The far light at a probe on surface: `E(n, u, v) = x n.x + y n.y + z n.z + along_u u + along_v v`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct FarLight {
+    /// Irradiance per component of the receiver's normal, lx.
+    pub by_normal: [Vec3; 3],
+    /// Change of irradiance along the probe's two tangents, lx/m.
+    pub along: [Vec3; 2],
+    /// Not used.
+    pub padding: f32,
+}
+
+impl FarLight {
+    /// Irradiance for a normal, at a place in the probe's frame.
+    #[must_use]
+    pub fn irradiance(&self, normal: Vec3, local: Vec3) -> Vec3 {
+        let [x, y, z] = self.by_normal;
+        let [u, v] = self.along;
+        (x * normal.x + y * normal.y + z * normal.z + u * local.x + v * local.y).max(Vec3::ZERO)
+    }
+}
+
+/// The far light of every probe on surface.
+#[must_use]
+pub fn refresh(grid: &Grid, sources: &[FarSource], radiosity: &[Vec3]) -> Vec<FarLight> {
+    let count = grid.surface_probes as usize;
+    (0..count).into_par_iter().map(|probe| far_light(grid, probe, sources, radiosity)).collect()
+}
+
+fn far_light(grid: &Grid, number: usize, sources: &[FarSource], radiosity: &[Vec3]) -> FarLight {
+    let mut far = FarLight::default();
+    let Some(probe) = grid.probes.get(number) else { return far };
+    let bitangent = probe.normal.cross(probe.tangent);
+    for (light, weight) in grid.row(number) {
+        let light = light as usize;
+        let Some((source, &radiosity)) = sources.get(light).zip(radiosity.get(light)) else { continue };
+        let irradiance = radiosity * (weight as f32 * probe.row_scale);
+        let lean = lean(probe, source);
+        // `lean . n = 1` at the probe's own normal, so there the irradiance is the row's.
+        far.by_normal[0] += irradiance * lean.x;
+        far.by_normal[1] += irradiance * lean.y;
+        far.by_normal[2] += irradiance * lean.z;
+        let slope = slope(probe, source);
+        far.along[0] += irradiance * slope.dot(probe.tangent);
+        far.along[1] += irradiance * slope.dot(bitangent);
+    }
+    far
+}
+
+/// The direction to a light, as long as makes it 1 high above the probe's surface.
+fn lean(probe: &Probe, source: &FarSource) -> Vec3 {
+    let direction = (source.centroid - probe.position).normalize_or_zero();
+    let cosine = direction.dot(probe.normal);
+    probe.normal + (direction - probe.normal * cosine) / cosine.max(LEAST_COSINE)
+}
+
+/// Relative change of a small light's form factor `(n.r)(-N.r) / |r|^4` per metre along the surface:
+/// `4 r / |r|^2 - N / (N.r)` (its part along the normal counts nothing).
+fn slope(probe: &Probe, source: &FarSource) -> Vec3 {
+    let r = source.centroid - probe.position;
+    let squared = r.length_squared();
+    let facing = source.normal.dot(r).min(-LEAST_COSINE * squared.sqrt());
+    let slope = r * (4.0 / squared) - source.normal / facing;
+    let most = 1.0 / (probe.reach.iter().sum::<f32>() / 4.0);
+    if slope.is_finite() { slope.clamp_length_max(most) } else { Vec3::ZERO }
+}

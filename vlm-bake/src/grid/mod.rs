@@ -1,0 +1,118 @@
+//! Stage 11: the static grid, from which a frame gathers its indirect light.
+//!
+//! **Probes** lie on the exposed surface, denser where light changes over short distances. From each, rays over the
+//! hemisphere find what share of its light comes from which surface, and so from which light: occlusion is known
+//! at the probe, whatever the lights will shine. Lights so near that a probe's light varies over its reach become *near*: the frame
+//! evaluates their form factor at each pixel, times the share of it that the probes see. All others are *far*: the frame sums them once per
+//! probe, and pixels blend their probes.
+//!
+//! Steps: `stand_in -> pool -> spacing -> reach -> transport -> near -> tree`.
+
+mod near;
+mod pool;
+mod reach;
+mod spacing;
+mod stand_in;
+mod transport;
+mod tree;
+
+pub use stand_in::StandIns;
+pub use transport::transport;
+
+use glam::{DVec3, Vec3};
+use vlm_format::{Grid, Probe, RowWriter};
+use vlm_shaders::cpu::upload::LightSet;
+
+use crate::progress::Progress;
+use crate::scene::Scene;
+use crate::shade::TraceScene;
+
+/// What a grid costs and how exact it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GridOptions {
+    /// Number of probes on surface; 0 for no grid. More of them resolve borders of shadow and corners better; file, bake and refresh grow in
+    /// proportion.
+    pub probes: u32,
+    /// Directions traced from each probe. Noise of the far light falls with its square root or better; the bake's time and,
+    /// less than in proportion, the file grow.
+    pub rays: u32,
+    /// The most near lights of a probe; 0 leaves everything to the far light. Higher values follow the light of nearby surface more closely,
+    /// and cost a form factor each at every pixel.
+    pub near: u32,
+    /// Edge of the coarsest cells, metres; `None` chooses one that suits the scene.
+    pub cell_size: Option<f32>,
+}
+
+/// What the builder starts from.
+pub struct GridInput<'a> {
+    /// The scene, ready for rays.
+    pub trace: &'a TraceScene<'a>,
+    /// Which light stands for which surface.
+    pub stand_ins: &'a StandIns,
+    /// The lights in world space.
+    pub lights: &'a LightSet,
+}
+
+/// Builds the grid; `None` without lights or without surface.
+#[must_use]
+pub fn grid(input: &GridInput, options: &GridOptions, progress: &dyn Progress) -> Option<Grid> {
+    let bounds = input.trace.scene.bounds()?;
+    if input.lights.is_empty() || options.probes == 0 {
+        return None;
+    }
+    let pool = pool::pool(input.trace, options.probes);
+    let spacing = spacing::Spacing::new(&pool, bounds, options.probes);
+    let mut chosen = spacing.spread(&pool);
+    let mut probes = reach::probes(input.trace, &pool, &spacing, &chosen);
+    for _ in 0..COVERING_ROUNDS {
+        let cells = tree::Tree::new(input.trace.scene, bounds, &probes, options.cell_size);
+        let missed = tree::uncovered(&cells.grid, &pool);
+        let more = spacing.spread_over(&pool, &missed, &chosen);
+        if more.is_empty() {
+            break;
+        }
+        probes.extend(reach::probes(input.trace, &pool, &spacing, &more));
+        chosen.extend(more);
+    }
+    let places: Vec<_> = chosen.iter().map(|&i| pool[i as usize]).collect();
+    progress.begin("transport", places.len() as u64);
+    let rows = transport::rows(input, &places, options.rays, progress);
+    let (near, far) = near::split(input.lights, &places, &probes, rows, options);
+    let mut cells = tree::Tree::new(input.trace.scene, bounds, &probes, options.cell_size);
+    cells.add_near(&near);
+    Some(encode(cells.grid, probes, &far))
+}
+
+/// Surface that no probe reaches gets more of them so often.
+const COVERING_ROUNDS: usize = 3;
+
+/// Packs the rows into the grid. Rounding is carried along a row, so that its sum stays.
+fn encode(mut grid: Grid, mut probes: Vec<Probe>, far: &[Vec<(u32, f32)>]) -> Grid {
+    let mut rows = RowWriter::default();
+    for (probe, row) in probes.iter_mut().zip(far) {
+        let largest = row.iter().map(|(_, weight)| *weight).fold(0.0, f32::max);
+        probe.row_scale = largest / 255.0;
+        let mut carried = 0.0;
+        rows.push(row.iter().filter_map(|&(light, weight)| {
+            let exact = weight / probe.row_scale + carried;
+            let rounded = exact.round().clamp(0.0, 255.0);
+            carried = exact - rounded;
+            (rounded > 0.0).then_some((light, rounded as u8))
+        }));
+    }
+    grid.surface_probes = probes.len() as u32;
+    grid.probes = probes;
+    grid.row_starts = rows.starts;
+    grid.rows = rows.words;
+    grid
+}
+
+impl Scene {
+    /// The box around all visible triangles in world space, or `None` without triangles.
+    #[must_use]
+    pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        let used = self.triangles.iter().flatten().map(|&v| self.positions[v as usize]);
+        let (low, high) = used.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
+        low.is_finite().then(|| [low.as_dvec3(), high.as_dvec3()])
+    }
+}

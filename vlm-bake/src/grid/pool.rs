@@ -1,0 +1,88 @@
+//! Places where probes may be: spread evenly over the surface that free space sees.
+
+use glam::{Mat3, Vec3};
+use rayon::prelude::*;
+
+use crate::bvh::Hit;
+use crate::shade::{SurfacePoint, TraceScene};
+use crate::reference::cosine_directions;
+use crate::topology::area;
+
+/// Places per probe. Higher values place probes more evenly and find smaller surfaces; each takes [`LOOKS`] rays.
+const PLACES_PER_PROBE: u32 = 10;
+
+/// At least so many places.
+const LEAST_PLACES: u32 = 40_000;
+
+/// Rays by which a place looks around.
+const LOOKS: u32 = 24;
+
+/// Places from which this share of directions meets backs lie inside something.
+const MOST_BACKS: f32 = 0.5;
+
+/// A place on exposed surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// The place itself.
+    pub surface: SurfacePoint,
+    /// The area for which it stands, square metres.
+    pub area: f32,
+    /// Harmonic mean distance of what it sees, metres (Ward, Rubinstein, Clear 1988): light changes over about this distance.
+    pub openness: f32,
+}
+
+/// Spreads places over all visible surface, and leaves out those that lie inside of something.
+#[must_use]
+pub fn pool(trace: &TraceScene, probes: u32) -> Vec<Place> {
+    let scene = trace.scene;
+    let corners = |t: usize| scene.corners(t).unwrap_or_default().map(Vec3::as_dvec3);
+    let areas: Vec<f64> = (0..scene.triangles.len())
+        .into_par_iter()
+        .map(|t| if trace.lit_sides(t as u32)[0] { area(corners(t)) } else { 0.0 })
+        .collect();
+    let count = probes.saturating_mul(PLACES_PER_PROBE).max(LEAST_PLACES);
+    let step = areas.iter().sum::<f64>() / f64::from(count);
+    if step <= 0.0 {
+        return Vec::new();
+    }
+    let mut ahead = 0.5 * step;
+    let mut drawn = Vec::with_capacity(count as usize);
+    for (t, area) in areas.iter().enumerate() {
+        while ahead < *area {
+            drawn.push(t as u32);
+            ahead += step;
+        }
+        ahead -= area;
+    }
+    let looked = drawn.par_iter().enumerate().flat_map_iter(|(i, &triangle)| {
+        let barycentric = crate::surface::uniform_barycentric(i as u64);
+        let [front, back] = trace.lit_sides(triangle);
+        let sides = [(front, true), (back, false)].into_iter().filter(|(lit, _)| *lit);
+        sides.filter_map(move |(_, front)| {
+            let hit = Hit { triangle, distance: 0.0, barycentric, front };
+            let surface = trace.surface(&hit, 0.0)?;
+            look(trace, surface, step as f32, i as u64)
+        })
+    });
+    looked.collect()
+}
+
+/// Looks around from a place; `None` inside of something.
+fn look(trace: &TraceScene, surface: SurfacePoint, area: f32, seed: u64) -> Option<Place> {
+    let origin = trace.bvh.leave(surface.position, surface.geometric_normal);
+    let (tangent, bitangent) = surface.normal.any_orthonormal_pair();
+    let (mut backs, mut inverse) = (0.0, 0.0);
+    let frame = Mat3::from_cols(tangent, bitangent, surface.normal);
+    for local in cosine_directions(LOOKS, seed) {
+        let direction = frame * local;
+        if direction.dot(surface.geometric_normal) <= 0.0 {
+            continue;
+        }
+        if let Some(hit) = trace.path_hit(origin, direction) {
+            backs += f32::from(u8::from(!trace.is_lit_side(&hit)));
+            inverse += 1.0 / hit.distance.max(f32::MIN_POSITIVE);
+        }
+    }
+    let openness = if inverse > 0.0 { LOOKS as f32 / inverse } else { f32::INFINITY };
+    (backs < MOST_BACKS * LOOKS as f32).then_some(Place { surface, area, openness })
+}

@@ -1,0 +1,98 @@
+//! How far around itself a probe counts: to where walls begin.
+
+use glam::Vec3;
+use rayon::prelude::*;
+use vlm_format::Probe;
+
+use super::pool::Place;
+use super::spacing::Spacing;
+use crate::shade::TraceScene;
+
+/// Reach along the surface over the spacing. Higher values blend more probes, which smooths their noise and blurs borders.
+const REACH: f32 = 1.9;
+
+/// Reach along the normal over that along the surface. Higher values blend over rounder edges and steps.
+const HEIGHT: f32 = 0.4;
+
+/// Rays along the surface.
+const AROUND: u32 = 32;
+
+/// They run at this height, over the reach. Lower ones are stopped by smaller steps.
+const LIFT: f32 = 0.03;
+
+/// A reach is never below this share of what it would be in the open.
+const LEAST: f32 = 0.02;
+
+/// The probes at the chosen places, their rows still empty.
+#[must_use]
+pub fn probes(trace: &TraceScene, pool: &[Place], spacing: &Spacing, chosen: &[u32]) -> Vec<Probe> {
+    let probe = |&i: &u32| {
+        let place = &pool[i as usize];
+        probe(trace, place, REACH * spacing.at(place))
+    };
+    chosen.par_iter().map(probe).collect()
+}
+
+fn probe(trace: &TraceScene, place: &Place, reach: f32) -> Probe {
+    let surface = &place.surface;
+    let normal = surface.normal;
+    let walls = walls(trace, place, reach);
+    let tangent = walls.first().map_or_else(
+        || normal.any_orthonormal_vector(),
+        |wall| wall.facing.reject_from(normal).try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector()),
+    );
+    let bitangent = normal.cross(tangent);
+    let mut sides = [reach; 4];
+    for wall in &walls {
+        let (u, v) = (wall.at.dot(tangent), wall.at.dot(bitangent));
+        let (axis, along) = if u.abs() >= v.abs() { (0, u) } else { (2, v) };
+        let side = &mut sides[axis + usize::from(along > 0.0)];
+        *side = side.min(along.abs());
+    }
+    let height = HEIGHT * reach;
+    let least = LEAST * reach;
+    let up = free(trace, surface.position, surface.geometric_normal, height);
+    let down = free(trace, surface.position, -surface.geometric_normal, height);
+    Probe {
+        position: surface.position,
+        row_scale: 0.0,
+        normal,
+        reach_up: up.max(least),
+        tangent,
+        reach_down: down.max(least),
+        reach: sides.map(|side| side.max(least)),
+    }
+}
+
+/// What stands in a probe's way along its surface.
+struct Wall {
+    /// From the probe, metres.
+    at: Vec3,
+    /// The wall's normal.
+    facing: Vec3,
+}
+
+/// The walls within reach, nearest first.
+fn walls(trace: &TraceScene, place: &Place, reach: f32) -> Vec<Wall> {
+    let surface = &place.surface;
+    let (u, v) = surface.geometric_normal.any_orthonormal_pair();
+    let lift = free(trace, surface.position, surface.geometric_normal, LIFT * reach) * 0.9;
+    let origin = trace.bvh.leave(surface.position + surface.geometric_normal * lift, surface.geometric_normal);
+    let mut walls: Vec<(f32, Wall)> = (0..AROUND)
+        .filter_map(|i| {
+            let (sin, cos) = (std::f32::consts::TAU * (i as f32 + 0.5) / AROUND as f32).sin_cos();
+            let direction = u * cos + v * sin;
+            let hit = trace.path_hit_within(origin, direction, reach * std::f32::consts::SQRT_2)?;
+            let facing = trace.surface(&hit, 0.0)?.geometric_normal;
+            Some((hit.distance, Wall { at: direction * hit.distance, facing }))
+        })
+        .collect();
+    walls.sort_by(|a, b| a.0.total_cmp(&b.0));
+    walls.into_iter().map(|(_, wall)| wall).collect()
+}
+
+/// How far one comes from a surface along a direction, at most `most`.
+fn free(trace: &TraceScene, position: Vec3, direction: Vec3, most: f32) -> f32 {
+    let origin = trace.bvh.leave(position, direction);
+    trace.path_hit_within(origin, direction, most).map_or(most, |hit| hit.distance)
+}

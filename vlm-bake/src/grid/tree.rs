@@ -1,0 +1,288 @@
+//! Cells over the scene, divided until each lists few probes; probes are scattered into the cells that they reach.
+
+use glam::{DVec3, IVec3, Vec3};
+use rayon::prelude::*;
+use vlm_format::{Grid, Leaf, MOST_PROBES, NearLight, Probe};
+use vlm_shaders::cpu::gather::Receiver;
+use vlm_shaders::cpu::grid::{blend, leaf_at};
+
+use super::near::NearRow;
+use super::pool::Place;
+use crate::scene::Scene;
+use crate::topology::Lists;
+
+/// The most cells along the longest axis: bounds the coarsest level.
+const MOST_CELLS: f64 = 256.0;
+
+/// Cells along the longest axis where the user names no size.
+pub const DEFAULT_CELLS: f64 = 16.0;
+
+/// How often a cell is divided at most.
+const DEEPEST: u32 = 6;
+
+/// A grid whose probes have no rows yet.
+pub struct Tree {
+    /// Cells, leaves and their probes.
+    pub grid: Grid,
+}
+
+impl Tree {
+    /// Divides the cells that hold surface.
+    #[must_use]
+    pub fn new(scene: &Scene, bounds: [DVec3; 2], probes: &[Probe], cell_size: Option<f32>) -> Self {
+        let mut grid = lattice(bounds, cell_size);
+        let size = f64::from(grid.cell_size);
+        let roots: usize = grid.dimensions.iter().map(|&d| d as usize).product();
+        let corner = |cell: IVec3| grid.origin.as_dvec3() + cell.as_dvec3() * size;
+        let triangles = triangles_by_cell(scene, &grid, roots);
+        let probes_of = probes_by_cell(probes, &grid, roots);
+        let builder = Builder { scene, probes };
+        let built: Vec<Node> = (0..roots)
+            .into_par_iter()
+            .map(|cell| {
+                let place = cell_place(cell, grid.dimensions);
+                let bounds = Cube { low: corner(place), size };
+                builder.node(&bounds, triangles.of(cell), probes_of.of(cell), 0)
+            })
+            .collect();
+        grid.probes = probes.to_vec();
+        grid.surface_probes = probes.len() as u32;
+        grid.cells = vec![0; roots];
+        built.into_iter().enumerate().for_each(|(cell, node)| store(&mut grid, cell, node));
+        let end = grid.leaf_probes.len() as u32;
+        grid.leaves.push(Leaf { probes: end, free_probes: end, near: 0, padding: 0 });
+        Self { grid }
+    }
+
+    /// Fills the leaves' lists of near lights from those of their probes.
+    pub fn add_near(&mut self, near: &[NearRow]) {
+        let grid = &mut self.grid;
+        let lists: Vec<Vec<NearLight>> =
+            grid.leaves.par_windows(2).map(|leaf| leaf_near(&grid.leaf_probes, leaf, near)).collect();
+        let mut start = 0;
+        for (leaf, list) in grid.leaves.iter_mut().zip(&lists) {
+            leaf.near = start;
+            start += list.len() as u32;
+        }
+        if let Some(end) = grid.leaves.last_mut() {
+            end.near = start;
+        }
+        grid.near = lists.concat();
+    }
+}
+
+/// All near lights of a leaf's probes, with a byte for each probe.
+fn leaf_near(leaf_probes: &[u32], leaf: &[Leaf], near: &[NearRow]) -> Vec<NearLight> {
+    let probes = &leaf_probes[leaf[0].probes as usize..leaf[0].free_probes as usize];
+    let entries = probes.iter().enumerate().flat_map(|(slot, &probe)| {
+        near[probe as usize].iter().map(move |&(light, visibility)| (light, slot, visibility))
+    });
+    let mut entries: Vec<(u32, usize, u8)> = entries.collect();
+    entries.sort_unstable();
+    let merge = |same: &[(u32, usize, u8)]| {
+        let mut merged = NearLight { light: same[0].0, visibility: [0; 4] };
+        for &(_, slot, visibility) in same {
+            merged.visibility[slot / 4] |= u32::from(visibility) << (8 * (slot % 4));
+        }
+        merged
+    };
+    entries.chunk_by(|a, b| a.0 == b.0).map(merge).collect()
+}
+
+/// Places of the pool that no probe reaches.
+#[must_use]
+pub fn uncovered(grid: &Grid, pool: &[Place]) -> Vec<u32> {
+    let reached = |place: &Place| {
+        let surface = &place.surface;
+        let receiver = Receiver {
+            position: surface.position,
+            normal: surface.normal,
+            geometric_normal: surface.geometric_normal,
+            tag: 0,
+        };
+        leaf_at(grid, surface.position)
+            .is_some_and(|leaf| blend(grid, leaf, &receiver).weights.iter().any(|&w| w > 0.0))
+    };
+    (0..pool.len() as u32).into_par_iter().filter(|&i| !reached(&pool[i as usize])).collect()
+}
+
+fn lattice(bounds: [DVec3; 2], cell_size: Option<f32>) -> Grid {
+    let extent = (bounds[1] - bounds[0]).max_element().max(f64::MIN_POSITIVE);
+    let least = extent / MOST_CELLS;
+    let asked = cell_size.map_or(extent / DEFAULT_CELLS, f64::from);
+    let cell_size = if asked > least { asked } else { least } as f32;
+    let size = f64::from(cell_size);
+    // A hair of room on each side, so that surface on the border of the box lies inside.
+    let origin = (bounds[0] - 1e-3 * size).as_vec3();
+    let dimensions = ((bounds[1] - origin.as_dvec3()) / size + 1e-3).floor().max(DVec3::ZERO).as_uvec3() + 1;
+    Grid { origin, cell_size, dimensions: dimensions.to_array(), ..Grid::default() }
+}
+
+fn cell_place(cell: usize, [nx, ny, _]: [u32; 3]) -> IVec3 {
+    let (nx, ny) = (nx as usize, ny as usize);
+    IVec3::new((cell % nx) as i32, (cell / nx % ny) as i32, (cell / nx / ny) as i32)
+}
+
+/// A cell in space.
+#[derive(Clone, Copy)]
+struct Cube {
+    low: DVec3,
+    size: f64,
+}
+
+impl Cube {
+    fn child(&self, octant: usize) -> Self {
+        let half = 0.5 * self.size;
+        let step = DVec3::new((octant & 1) as f64, (octant >> 1 & 1) as f64, (octant >> 2 & 1) as f64);
+        Self { low: self.low + step * half, size: half }
+    }
+
+    /// True if a slab around the plane through `at`, from `below` to `above` along `normal`, meets the cell.
+    fn meets_slab(&self, at: DVec3, normal: DVec3, below: f64, above: f64) -> bool {
+        let half = 0.5 * self.size;
+        let height = (self.low + half - at).dot(normal);
+        let radius = half * normal.abs().element_sum();
+        height + radius >= -below && height - radius <= above
+    }
+
+    fn meets_box(&self, low: DVec3, high: DVec3) -> bool {
+        (low.cmple(self.low + self.size) & high.cmpge(self.low)).all()
+    }
+}
+
+/// A cell with what it holds.
+enum Node {
+    Empty,
+    Leaf(Vec<u32>),
+    Divided(Box<[Node; 8]>),
+}
+
+struct Builder<'a> {
+    scene: &'a Scene,
+    probes: &'a [Probe],
+}
+
+impl Builder<'_> {
+    fn node(&self, cube: &Cube, triangles: &[u32], probes: &[u32], depth: u32) -> Node {
+        let triangles: Vec<u32> =
+            triangles.iter().copied().filter(|&t| triangle_meets(self.scene, t, cube)).collect();
+        let mut probes: Vec<u32> =
+            probes.iter().copied().filter(|&p| probe_meets(&self.probes[p as usize], cube)).collect();
+        if triangles.is_empty() || probes.is_empty() {
+            return Node::Empty;
+        }
+        if probes.len() <= MOST_PROBES {
+            return Node::Leaf(probes);
+        }
+        if depth == DEEPEST {
+            self.keep_nearest(&mut probes, cube);
+            return Node::Leaf(probes);
+        }
+        let child = |octant| self.node(&cube.child(octant), &triangles, &probes, depth + 1);
+        Node::Divided(Box::new(std::array::from_fn(child)))
+    }
+
+    /// Of too many probes those stay that weigh most in the middle of the cell.
+    fn keep_nearest(&self, probes: &mut Vec<u32>, cube: &Cube) {
+        let middle = (cube.low + 0.5 * cube.size).as_vec3();
+        let away = |&p: &u32| {
+            let probe = &self.probes[p as usize];
+            let reach = probe.reach.iter().copied().fold(0.0, f32::max);
+            middle.distance(probe.position) / reach
+        };
+        probes.sort_by(|a, b| away(a).total_cmp(&away(b)).then(a.cmp(b)));
+        probes.truncate(MOST_PROBES);
+        probes.sort_unstable();
+    }
+}
+
+fn store(grid: &mut Grid, cell: usize, node: Node) {
+    match node {
+        Node::Empty => {}
+        Node::Leaf(probes) => {
+            grid.cells[cell] = 2 * grid.leaves.len() as u32 + 1;
+            let start = grid.leaf_probes.len() as u32;
+            grid.leaf_probes.extend(probes);
+            let end = grid.leaf_probes.len() as u32;
+            grid.leaves.push(Leaf { probes: start, free_probes: end, near: 0, padding: 0 });
+        }
+        Node::Divided(children) => {
+            let first = grid.cells.len();
+            grid.cells[cell] = 2 * first as u32;
+            grid.cells.resize(first + 8, 0);
+            children.into_iter().enumerate().for_each(|(i, child)| store(grid, first + i, child));
+        }
+    }
+}
+
+/// The visible triangles that may touch each cell of the coarsest level.
+fn triangles_by_cell(scene: &Scene, grid: &Grid, cells: usize) -> Lists {
+    let touched = |t: usize| {
+        let [a, b, c] = scene.corners(t).unwrap_or_default().map(Vec3::as_dvec3);
+        (a.min(b).min(c), a.max(b).max(c))
+    };
+    scatter(scene.triangles.len(), touched, grid, cells)
+}
+
+/// The probes whose reach may touch each cell of the coarsest level.
+fn probes_by_cell(probes: &[Probe], grid: &Grid, cells: usize) -> Lists {
+    scatter(probes.len(), |p| probe_box(&probes[p]), grid, cells)
+}
+
+/// Scatters things with boxes over the cells that these touch: counted, then filled.
+fn scatter(count: usize, bounds: impl Fn(usize) -> (DVec3, DVec3) + Sync, grid: &Grid, cells: usize) -> Lists {
+    let size = f64::from(grid.cell_size);
+    let most = IVec3::from_array(grid.dimensions.map(|d| d as i32)) - 1;
+    let cell_of = |p: DVec3| ((p - grid.origin.as_dvec3()) / size).floor().as_ivec3().clamp(IVec3::ZERO, most);
+    let [nx, ny, _] = grid.dimensions;
+    let touched = |i: usize| {
+        let (low, high) = bounds(i);
+        let room = DVec3::splat(1e-3 * size);
+        let (low, high) = (cell_of(low - room), cell_of(high + room));
+        let rows = (low.z..=high.z).flat_map(move |z| (low.y..=high.y).map(move |y| (y, z)));
+        let cells = rows.flat_map(move |(y, z)| (low.x..=high.x).map(move |x| (x, y, z)));
+        cells.map(move |(x, y, z)| x as u32 + nx * (y as u32 + ny * z as u32)).collect::<Vec<u32>>()
+    };
+    let touched: Vec<Vec<u32>> = (0..count).into_par_iter().map(touched).collect();
+    let pairs = touched.iter().zip(0..);
+    Lists::new(cells, pairs.flat_map(|(cells, i)| cells.iter().map(move |&cell| (cell, i))))
+}
+
+/// Points keep their cell though rounding moves them by this share of it.
+const ROUNDING: f64 = 1e-3;
+
+fn triangle_meets(scene: &Scene, triangle: u32, cube: &Cube) -> bool {
+    let [a, b, c] = scene.corners(triangle as usize).unwrap_or_default().map(Vec3::as_dvec3);
+    let room = ROUNDING * cube.size;
+    let normal = (b - a).cross(c - a).normalize_or_zero();
+    cube.meets_box(a.min(b).min(c) - room, a.max(b).max(c) + room) && cube.meets_slab(a, normal, room, room)
+}
+
+/// The axes of a probe with its reach against and along each, in f64.
+fn axes(probe: &Probe) -> [(DVec3, f64, f64); 3] {
+    let [left, right, back, front] = probe.reach.map(f64::from);
+    let (normal, tangent) = (probe.normal.as_dvec3(), probe.tangent.as_dvec3());
+    [
+        (tangent, left, right),
+        (normal.cross(tangent), back, front),
+        (normal, f64::from(probe.reach_down), f64::from(probe.reach_up)),
+    ]
+}
+
+fn probe_box(probe: &Probe) -> (DVec3, DVec3) {
+    let at = probe.position.as_dvec3();
+    let (mut low, mut high) = (at, at);
+    for (axis, below, above) in axes(probe) {
+        let (a, b) = (axis * -below, axis * above);
+        low += a.min(b);
+        high += a.max(b);
+    }
+    (low, high)
+}
+
+fn probe_meets(probe: &Probe, cube: &Cube) -> bool {
+    let (low, high) = probe_box(probe);
+    let at = probe.position.as_dvec3();
+    cube.meets_box(low, high)
+        && axes(probe).into_iter().all(|(axis, below, above)| cube.meets_slab(at, axis, below, above))
+}
