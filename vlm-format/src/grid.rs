@@ -119,6 +119,15 @@ impl Probe {
         product * product
     }
 
+    /// The weight outside of the reach, for points that no probe reaches: above 0 everywhere.
+    #[must_use]
+    pub fn stray_weight(&self, local: Vec3, normal: Vec3) -> f32 {
+        let facing = (0.5 + 0.5 * normal.dot(self.normal)).max(0.0);
+        let size = self.reach[0].max(self.reach[1]).max(self.reach[2]).max(self.reach[3]);
+        let away = local.length_squared() / (size * size);
+        (facing * facing + 1e-3) / (1e-2 + away * away)
+    }
+
     /// The factor of a unit normal, 0 to 1.
     #[must_use]
     pub fn normal_weight(&self, normal: Vec3) -> f32 {

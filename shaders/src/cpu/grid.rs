@@ -8,6 +8,9 @@ use super::gather::Receiver;
 /// The most levels below the coarsest: bounds the descent, whatever a file holds.
 const DEEPEST: u32 = 24;
 
+/// What a probe counts outside its reach: nothing, but where no other reaches either. Higher values leak, lower ones underflow.
+const STRAY: f32 = 1e-6;
+
 /// The leaf that holds `x`; `None` outside the grid and where nothing is stored.
 #[must_use]
 pub fn leaf_at(grid: &Grid, x: Vec3) -> Option<u32> {
@@ -64,8 +67,9 @@ pub fn blend(grid: &Grid, leaf: u32, receiver: &Receiver) -> Blend {
     for i in 0..blend.count {
         let probe = grid.leaf_probes.get((blend.first + i) as usize);
         let Some(probe) = probe.and_then(|&probe| grid.probes.get(probe as usize)) else { continue };
-        let weight =
-            probe.normal_weight(receiver.normal) * probe.place_weight(probe.local(receiver.position));
+        let local = probe.local(receiver.position);
+        let inside = probe.normal_weight(receiver.normal) * probe.place_weight(local);
+        let weight = inside + STRAY * probe.stray_weight(local, receiver.normal);
         blend.weights[i as usize] = weight;
         sum += weight;
     }

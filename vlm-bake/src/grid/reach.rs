@@ -9,7 +9,7 @@ use super::spacing::Spacing;
 use crate::shade::TraceScene;
 
 /// Reach along the surface over the spacing. Higher values blend more probes, which smooths their noise and blurs borders.
-const REACH: f32 = 1.9;
+const REACH: f32 = 1.45;
 
 /// Reach along the normal over that along the surface. Higher values blend over rounder edges and steps.
 const HEIGHT: f32 = 0.4;

@@ -10,7 +10,7 @@ const WIDEST: f32 = 1.0 / 16.0;
 
 /// The narrowest spacing over the widest. Lower values follow contact shadows into smaller corners, where few pixels see
 /// them.
-const NARROWEST: f32 = 1.0 / 32.0;
+const NARROWEST: f32 = 1.0 / 24.0;
 
 /// Area per probe over the square of its spacing, as random placing with a least distance leaves it.
 const PACKING: f32 = 0.7;

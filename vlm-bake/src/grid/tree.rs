@@ -163,13 +163,18 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    fn node(&self, cube: &Cube, triangles: &[u32], probes: &[u32], depth: u32) -> Node {
+    fn node(&self, cube: &Cube, triangles: &[u32], around: &[u32], depth: u32) -> Node {
         let triangles: Vec<u32> =
             triangles.iter().copied().filter(|&t| triangle_meets(self.scene, t, cube)).collect();
-        let mut probes: Vec<u32> =
-            probes.iter().copied().filter(|&p| probe_meets(&self.probes[p as usize], cube)).collect();
-        if triangles.is_empty() || probes.is_empty() {
+        if triangles.is_empty() || around.is_empty() {
             return Node::Empty;
+        }
+        let mut probes: Vec<u32> =
+            around.iter().copied().filter(|&p| probe_meets(&self.probes[p as usize], cube)).collect();
+        if probes.is_empty() {
+            // Surface that no probe reaches takes those of the larger cell.
+            probes = around.to_vec();
+            self.keep_nearest(&mut probes, cube);
         }
         if probes.len() <= MOST_PROBES {
             return Node::Leaf(probes);

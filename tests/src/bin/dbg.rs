@@ -1,0 +1,53 @@
+//! dbg
+use vlm_bake::{bake::bake, options::*, progress::Silent, scene::*, shade::TraceScene, render::*, gbuffer::GBuffer};
+use vlm_shaders::cpu::{grid::*, resolve::luminance};
+use vlm_shaders::cpu::gather::Receiver;
+fn main() {
+    let mut a = std::env::args().skip(1);
+    let name = a.next().unwrap();
+    let path = vlm_tests::pareto::scene::file(&name).unwrap();
+    let file = vlm_format::GltfFile::open(&path).unwrap();
+    let scene = load(&file, &LoadOptions::default()).unwrap();
+    let mut o = BakeOptions::preset(Preset::Game, scene.triangles.len());
+    if let Some(p) = a.next() { o.grid.probes = p.parse().unwrap(); }
+    o.grid.rays = 16;
+    let b = bake(&scene, &o, &Silent).unwrap();
+    let trace = TraceScene::new(&scene);
+    let g = b.asset.grid.as_ref().unwrap();
+    println!("extent {:?}", scene.bounds());
+    println!("leaves {} probes {} near {} far {} leafprobes {} bytes {}", g.leaves.len()-1, g.probes.len(), g.near.len(), g.row_starts.last().unwrap(), g.leaf_probes.len(), g.byte_len());
+    let lit = LitScene::new(&trace, &b.asset).unwrap();
+    let mut cams = scene.cameras.clone(); cams.extend(vlm_tests::pareto::scene::more_cameras(&name));
+    for c in &cams {
+        let gb = GBuffer::trace(&trace, c, 256, 144);
+        let (mut noleaf, mut zero, mut n, mut nolight) = (0,0,0,0);
+        let (mut bt, mut bl) = (0.0, 0.0);
+        for p in gb.points.iter().flatten() {
+            n += 1;
+            match leaf_at(g, p.position) { None => noleaf += 1, Some(l) => {
+                let bl = blend(g, l, &Receiver{position:p.position, normal:p.normal, geometric_normal:p.geometric_normal, tag:0});
+                if bl.weights.iter().all(|w| *w==0.0) { zero += 1; }
+            }}
+            bt += luminance(trace.reflected(p));
+            // find bary: shoot ray
+            let o = p.position + p.geometric_normal*1e-3;
+            if let Some(h) = trace.path_hit(o, -p.geometric_normal) {
+                match b.stand_ins.light_at(h.triangle, h.barycentric, h.front) { None => nolight += 1, Some((l, r)) => bl += luminance(lit.radiosity[l as usize]) * r }
+            }
+        }
+        let mut k = 0;
+        for (i, p) in gb.points.iter().enumerate().filter_map(|(i,p)| p.as_ref().map(|p| (i,p))).step_by(97) {
+            let o = p.position + p.geometric_normal*1e-3;
+            if let Some(h) = trace.path_hit(o, -p.geometric_normal) && let Some((l, r)) = b.stand_ins.light_at(h.triangle, h.barycentric, h.front) {
+                let t = luminance(trace.reflected(p)); let bl = luminance(lit.radiosity[l as usize]) * r;
+                if (t - bl).abs() > 0.5 * t.max(bl) && t > 0.1 && k < 0 { k += 1;
+                    let geo = &lit.lights.geometry[l as usize];
+                    let s = lit.lights.samples_of(l as usize);
+                    println!("  pix {i} at {:?} n {:?} tri {} prim {} two {:?}: true {t} light {bl} = B {:?} * {r}; light {l} tag {} area {} n {:?} at {:?} albedo {:?} pixel albedo {:?} samples {:?}", p.position, p.geometric_normal, h.triangle, scene.triangle_primitive[h.triangle as usize], trace.lit_sides(h.triangle), lit.radiosity[l as usize], lit.lights.tags[l as usize], geo.area(), geo.normal.normalize(), geo.v0, b.asset.albedo[l as usize], p.albedo, s.iter().map(|s| (s.position, s.normal, s.reflectance, trace.direct_irradiance(s.position, s.normal, s.normal).x)).collect::<Vec<_>>());
+                }
+            }
+        }
+        println!("{}: pixels {n} no leaf {noleaf} zero weight {zero} no light {nolight} radiosity true {bt} lights {bl}", c.name);
+    }
+    println!("{:?}", b.report.seconds);
+}
