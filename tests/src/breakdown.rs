@@ -5,7 +5,7 @@
 //! lights and samples. `grid` is the method itself: interpolation of visibility and far light, and rays of the probes, come on top.
 //! `algorithm` is the distance of `grid` from the exact sum over its own lights with visibility.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use glam::Vec3;
@@ -17,9 +17,11 @@ use vlm_bake::progress::Silent;
 use vlm_bake::render::{LitScene, RenderError, gather_by_grid};
 use vlm_bake::scene::{Camera, Scene};
 use vlm_bake::shade::TraceScene;
+use vlm_shaders::cpu::resolve::luminance;
 
 use crate::method::View;
 use crate::metrics::{Comparison, Metrics, compare};
+use crate::pareto::false_colour::false_colour;
 use crate::truth::{TruthError, Truths};
 
 /// One camera of one scene with one bake.
@@ -43,6 +45,8 @@ pub struct Row {
     pub noise: f64,
     /// Error of the lights' resolution alone; empty where it was not asked for.
     pub lights_error: Option<f64>,
+    /// Signed energy likewise.
+    pub lights_energy: Option<f64>,
     /// Error of the grid.
     pub error: f64,
     /// Signed energy of the grid.
@@ -62,6 +66,14 @@ pub enum BreakdownError {
     /// No picture can be made.
     #[error(transparent)]
     Render(#[from] RenderError),
+    /// A picture cannot be written.
+    #[error("{path}: {source}", path = path.display())]
+    Picture {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: image::ImageError,
+    },
     /// No truth can be had.
     #[error(transparent)]
     Truth(#[from] TruthError),
@@ -76,6 +88,8 @@ pub struct BreakdownOptions {
     pub spp: u32,
     /// Directions per pixel of the `lights` column; 0 leaves it out.
     pub lights_spp: u32,
+    /// Folder for pictures of the signed error: its scale ends at the truth's mean.
+    pub pictures: Option<PathBuf>,
 }
 
 /// Bakes a scene and measures it from each camera.
@@ -103,13 +117,17 @@ pub fn measure(
             let width = options.size.0 as usize;
             compare(&Comparison { width, image, truth: &truth.irradiance, hit: &hit }).unwrap_or_default()
         };
-        let lights_error = if options.lights_spp > 0 {
-            let image = by_lights(&trace, &view, &baked, options.lights_spp)?;
-            Some(compare(&image).relative_rmse)
+        let by_lights = if options.lights_spp > 0 {
+            let image = traced_by_lights(&trace, &view, &baked, options.lights_spp)?;
+            Some(compare(&image))
         } else {
             None
         };
         let metrics = compare(&picture);
+        if let Some(folder) = &options.pictures {
+            let path = folder.join(format!("{name}_{}_{}.png", camera.name, bake_options.preset.name()));
+            write_error(&path, options.size, &picture, &truth.irradiance)?;
+        }
         let grid = &baked.report.grid;
         Ok(Row {
             scene: name.to_owned(),
@@ -120,7 +138,8 @@ pub fn measure(
             grid_bytes: grid.bytes,
             grid_seconds: baked.report.seconds.get("grid").copied().unwrap_or(0.0),
             noise: truth.noise,
-            lights_error,
+            lights_error: by_lights.map(|m| m.relative_rmse),
+            lights_energy: by_lights.map(|m| m.signed_energy),
             error: metrics.relative_rmse,
             energy: metrics.signed_energy,
             pairs: stats.pairs_evaluated as f64 / metrics.pixels.max(1) as f64,
@@ -131,7 +150,7 @@ pub fn measure(
 }
 
 /// Path tracing in which surface has the radiosity of its light.
-fn by_lights(trace: &TraceScene, view: &View, baked: &Bake, spp: u32) -> Result<Vec<Vec3>, RenderError> {
+fn traced_by_lights(trace: &TraceScene, view: &View, baked: &Bake, spp: u32) -> Result<Vec<Vec3>, RenderError> {
     let lit = LitScene::new(trace, &baked.asset)?;
     let at = |(pixel, point): (usize, &Option<vlm_bake::shade::SurfacePoint>)| {
         point.as_ref().map_or(Vec3::ZERO, |point| {
@@ -142,6 +161,15 @@ fn by_lights(trace: &TraceScene, view: &View, baked: &Bake, spp: u32) -> Result<
     Ok(view.gbuffer.points.par_iter().enumerate().map(at).collect())
 }
 
+/// The signed error of luminance over the truth's mean, blue too dark, red too bright.
+fn write_error(path: &Path, (width, height): (u32, u32), picture: &[Vec3], truth: &[Vec3]) -> Result<(), BreakdownError> {
+    let mean = truth.iter().map(|&t| luminance(t)).sum::<f32>() / truth.len().max(1) as f32;
+    let colour = |i: usize| false_colour(f64::from((luminance(picture[i]) - luminance(truth[i])) / mean));
+    let pixels: Vec<u8> = (0..truth.len()).flat_map(colour).collect();
+    image::save_buffer(path, &pixels, width, height, image::ExtendedColorType::Rgb8)
+        .map_err(|source| BreakdownError::Picture { path: path.to_owned(), source })
+}
+
 /// The rows as a table.
 #[must_use]
 pub fn table(rows: &[Row]) -> String {
@@ -150,7 +178,8 @@ pub fn table(rows: &[Row]) -> String {
          |---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for r in rows {
-        let lights = r.lights_error.map_or_else(String::new, |e| format!("{e:.3}"));
+        let lights = r.lights_error.zip(r.lights_energy);
+        let lights = lights.map_or_else(String::new, |(e, energy)| format!("{e:.3}, {:+.1} %", 100.0 * energy));
         text += &format!(
             "| {} | {} | {} | {} | {} | {:.1} | {:.1} | {:.3} | {lights} | {:.3} | {:+.1} % | {:.1} | {:.2} |\n",
             r.scene,

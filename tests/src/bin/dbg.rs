@@ -21,18 +21,18 @@ fn main() {
     for c in &cams {
         let gb = GBuffer::trace(&trace, c, 256, 144);
         let (mut noleaf, mut zero, mut n, mut nolight) = (0,0,0,0);
-        let (mut bt, mut bl) = (0.0, 0.0);
+        let mut per = vec![(0.0,0.0); scene.primitives.len()]; let (mut bt, mut bl) = (0.0, 0.0);
         for p in gb.points.iter().flatten() {
             n += 1;
             match leaf_at(g, p.position) { None => noleaf += 1, Some(l) => {
                 let bl = blend(g, l, &Receiver{position:p.position, normal:p.normal, geometric_normal:p.geometric_normal, tag:0});
                 if bl.weights.iter().all(|w| *w==0.0) { zero += 1; }
             }}
-            bt += luminance(trace.reflected(p));
+            bt += luminance(trace.reflected(p)); let pr = scene.triangle_primitive[p.triangle as usize] as usize; per[pr].0 += luminance(trace.reflected(p));
             // find bary: shoot ray
             let o = p.position + p.geometric_normal*1e-3;
             if let Some(h) = trace.path_hit(o, -p.geometric_normal) {
-                match b.stand_ins.light_at(h.triangle, h.barycentric, h.front) { None => nolight += 1, Some((l, r)) => bl += luminance(lit.radiosity[l as usize]) * r }
+                match b.stand_ins.light_at(h.triangle, h.barycentric, h.front) { None => nolight += 1, Some((l, r)) => { bl += luminance(lit.radiosity[l as usize]) * r; per[pr].1 += luminance(lit.radiosity[l as usize]) * r;} }
             }
         }
         let mut k = 0;
@@ -47,6 +47,7 @@ fn main() {
                 }
             }
         }
+        for (i, (t, l)) in per.iter().enumerate() { if (t - l).abs() > 0.01 * bt { println!("   prim {i} {} two {}: {t} {l}", scene.materials[scene.primitives[i].material as usize].name, scene.materials[scene.primitives[i].material as usize].two_sided); } }
         println!("{}: pixels {n} no leaf {noleaf} zero weight {zero} no light {nolight} radiosity true {bt} lights {bl}", c.name);
     }
     println!("{:?}", b.report.seconds);

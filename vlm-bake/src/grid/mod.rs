@@ -62,15 +62,13 @@ pub fn grid(input: &GridInput, options: &GridOptions, progress: &dyn Progress) -
     }
     let pool = pool::pool(input.trace, options.probes);
     let spacing = spacing::Spacing::new(&pool, bounds, options.probes);
-    let mut chosen = spacing.spread(&pool);
+    let mut chosen = spacing.spread(&pool, 0..pool.len() as u32, 1.0);
     let mut probes = reach::probes(input.trace, &pool, &spacing, &chosen);
-    for _ in 0..COVERING_ROUNDS {
+    for share in COVERING {
         let cells = tree::Tree::new(input.trace.scene, bounds, &probes, options.cell_size);
         let missed = tree::uncovered(&cells.grid, &pool);
-        let more = spacing.spread_over(&pool, &missed, &chosen);
-        if more.is_empty() {
-            break;
-        }
+        if std::env::var("DBG").is_ok() { eprintln!("missed {} of {} probes {}", missed.len(), pool.len(), probes.len()); }
+        let more = spacing.spread(&pool, missed, share);
         probes.extend(reach::probes(input.trace, &pool, &spacing, &more));
         chosen.extend(more);
     }
@@ -83,8 +81,9 @@ pub fn grid(input: &GridInput, options: &GridOptions, progress: &dyn Progress) -
     Some(encode(cells.grid, probes, &far))
 }
 
-/// Surface that no probe reaches gets more of them so often.
-const COVERING_ROUNDS: usize = 3;
+/// Surface that no probe reaches, behind walls, steps and edges, gets probes of its own in as many rounds, at these shares of their
+/// spacing. More rounds leave less of it.
+const COVERING: [f32; 3] = [0.9, 0.6, 0.4];
 
 /// Packs the rows into the grid. Rounding is carried along a row, so that its sum stays.
 fn encode(mut grid: Grid, mut probes: Vec<Probe>, far: &[Vec<(u32, f32)>]) -> Grid {

@@ -12,13 +12,13 @@ use crate::shade::TraceScene;
 const REACH: f32 = 1.45;
 
 /// Reach along the normal over that along the surface. Higher values blend over rounder edges and steps.
-const HEIGHT: f32 = 0.4;
+const HEIGHT: f32 = 0.5;
 
 /// Rays along the surface.
 const AROUND: u32 = 32;
 
 /// They run at this height, over the reach. Lower ones are stopped by smaller steps.
-const LIFT: f32 = 0.03;
+const LIFT: f32 = 0.12;
 
 /// A reach is never below this share of what it would be in the open.
 const LEAST: f32 = 0.02;

@@ -35,7 +35,7 @@ impl Spacing {
         let (mut low, mut high) = (1e-4_f32, 1e3_f32);
         for _ in 0..40 {
             spacing.factor = (low * high).sqrt();
-            let count: f32 = pool.iter().map(|p| p.area / (PACKING * spacing.at(p).powi(2))).sum();
+            let count: f32 = pool.iter().map(|p| (p.area / (PACKING * spacing.at(p).powi(2))).min(1.0)).sum();
             if count > probes as f32 { low = spacing.factor } else { high = spacing.factor }
         }
         spacing
@@ -47,23 +47,12 @@ impl Spacing {
         (self.factor * place.openness).clamp(self.narrowest, self.widest)
     }
 
-    /// Places that are nowhere nearer to each other than their spacing, by number.
+    /// Some of the `candidates`, none nearer to another than `share` of their spacing.
     #[must_use]
-    pub fn spread(&self, pool: &[Place]) -> Vec<u32> {
-        let all: Vec<u32> = (0..pool.len() as u32).collect();
-        self.spread_over(pool, &all, &[])
-    }
-
-    /// Some of `candidates` that are far enough from each other; `taken` narrows nothing but says what is there already.
-    #[must_use]
-    pub fn spread_over(&self, pool: &[Place], candidates: &[u32], taken: &[u32]) -> Vec<u32> {
-        let mut order: Vec<u32> = candidates.to_vec();
+    pub fn spread(&self, pool: &[Place], candidates: impl IntoIterator<Item = u32>, share: f32) -> Vec<u32> {
+        let mut order: Vec<u32> = candidates.into_iter().collect();
         order.sort_unstable_by_key(|&i| shuffled(i));
-        let mut near = Neighbourhood::new(self);
-        let share = if taken.is_empty() { 1.0 } else { 0.5 };
-        for &i in taken {
-            near.insert(pool, i, share * self.at(&pool[i as usize]));
-        }
+        let mut near = Neighbourhood::new(share * self.narrowest);
         let mut chosen = Vec::new();
         for i in order {
             let distance = share * self.at(&pool[i as usize]);
@@ -94,8 +83,8 @@ struct Neighbourhood {
 }
 
 impl Neighbourhood {
-    fn new(spacing: &Spacing) -> Self {
-        Self { narrowest: 0.5 * spacing.narrowest, levels: Default::default() }
+    fn new(narrowest: f32) -> Self {
+        Self { narrowest, levels: Default::default() }
     }
 
     /// The level whose cells are at least as wide as a distance.

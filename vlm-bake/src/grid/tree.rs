@@ -3,8 +3,7 @@
 use glam::{DVec3, IVec3, Vec3};
 use rayon::prelude::*;
 use vlm_format::{Grid, Leaf, MOST_PROBES, NearLight, Probe};
-use vlm_shaders::cpu::gather::Receiver;
-use vlm_shaders::cpu::grid::{blend, leaf_at};
+use vlm_shaders::cpu::grid::leaf_at;
 
 use super::near::NearRow;
 use super::pool::Place;
@@ -89,19 +88,21 @@ fn leaf_near(leaf_probes: &[u32], leaf: &[Leaf], near: &[NearRow]) -> Vec<NearLi
     entries.chunk_by(|a, b| a.0 == b.0).map(merge).collect()
 }
 
+/// A place is reached where the weights of its probes sum to this. Lower values leave more places to the very edge of some probe's reach.
+const REACHED: f32 = 0.05;
+
 /// Places of the pool that no probe reaches.
 #[must_use]
 pub fn uncovered(grid: &Grid, pool: &[Place]) -> Vec<u32> {
     let reached = |place: &Place| {
         let surface = &place.surface;
-        let receiver = Receiver {
-            position: surface.position,
-            normal: surface.normal,
-            geometric_normal: surface.geometric_normal,
-            tag: 0,
+        let Some(leaf) = leaf_at(grid, surface.position) else { return false };
+        let [from, to] = [leaf, leaf + 1].map(|leaf| grid.leaves[leaf as usize].probes as usize);
+        let weight = |&probe: &u32| {
+            let probe = &grid.probes[probe as usize];
+            probe.normal_weight(surface.normal) * probe.place_weight(probe.local(surface.position))
         };
-        leaf_at(grid, surface.position)
-            .is_some_and(|leaf| blend(grid, leaf, &receiver).weights.iter().any(|&w| w > 0.0))
+        grid.leaf_probes[from..to].iter().map(weight).sum::<f32>() > REACHED
     };
     (0..pool.len() as u32).into_par_iter().filter(|&i| !reached(&pool[i as usize])).collect()
 }

@@ -55,6 +55,7 @@ pub struct BreakdownArgs {
 /// # Errors
 /// If a scene cannot be had, or files cannot be written.
 pub fn run(args: &BreakdownArgs) -> Result<(), Box<dyn Error>> {
+    args.out.as_deref().map(make_folder).transpose()?;
     let mut rows = Vec::new();
     for name in &args.scenes {
         let path = scene::file(name).ok_or_else(|| format!("there is no scene `{name}`"))?;
@@ -67,6 +68,7 @@ pub fn run(args: &BreakdownArgs) -> Result<(), Box<dyn Error>> {
         let options = BreakdownOptions {
             size: scene::default_size(name),
             spp: args.spp,
+            pictures: args.out.clone(),
             lights_spp: if args.causes { args.spp } else { 0 },
         };
         for preset in Preset::ALL.into_iter().filter(|p| args.presets.iter().any(|name| name == p.name())) {
@@ -81,7 +83,6 @@ pub fn run(args: &BreakdownArgs) -> Result<(), Box<dyn Error>> {
     let text = table(&rows);
     println!("{text}");
     if let Some(out) = &args.out {
-        make_folder(out)?;
         let mut raw = csv::Writer::from_path(out.join("raw.csv"))?;
         rows.iter().try_for_each(|row| raw.serialize(row))?;
         raw.flush()?;
