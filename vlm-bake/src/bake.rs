@@ -13,7 +13,7 @@ use crate::decimate::{Decimation, LightMesh, decimate};
 use crate::flux::{conserve, steer};
 use crate::grid::grid;
 use crate::ground::Ground;
-use crate::mend::{kept, mend};
+use crate::mend::{mend, thinned};
 use crate::offset::Surroundings;
 use crate::options::BakeOptions;
 use crate::patches::{Patches, patches};
@@ -28,7 +28,6 @@ use crate::surface::SurfacePoint;
 use crate::tag::Tags;
 use crate::topology::{Lists, area, aspect_ratio};
 use crate::verify::Verification;
-use crate::verify::judge::{Evidence, verify};
 use crate::write::{order, placeable};
 
 /// Lights sink by at most this many times the clearance and the mean distance between faces and their surface together. Higher values
@@ -86,21 +85,18 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let ground = Ground::new(scene, &patches);
     let coarse = mesh.lights();
     let points = ground.points(options.lights as usize);
-    let light_of_point = Correspondence::new(&ground, &coarse, |_| true).of(&points);
-    let distance = measured_distance(&points, &light_of_point, &coarse);
+    let fewer = thinned(&points, coarse.len());
+    let light_of_point = Correspondence::new(&ground, &coarse, |_| true).of(&fewer);
+    let distance = measured_distance(&fewer, &light_of_point, &coarse);
     let deepest = DEEPEST * (ground.clearance + distance.mean_m);
-    let around = Surroundings { ground: &ground, points: &points, deepest };
+    let around = Surroundings { ground: &ground, deepest };
     let snap = Snap::new(&patches);
     let density = densities(scene, &patches, &mesh, &points_of_lights(&light_of_point, coarse.len()));
     let budget = (options.lights as usize).saturating_sub(authored::count(scene));
-    let hidden = mend(Refiner::new(mesh, density, &snap), budget, &around);
-
-    clock.stage("verify");
-    let (hidden, light_of_point) = kept(scene, &ground, &points, hidden);
+    let mut hidden = mend(scene, Refiner::new(mesh, density, &snap), budget, &around, &points);
     let lights = &hidden.lights;
-    let standing = points_of_lights(&light_of_point, lights.len());
-    let evidence = Evidence { ground: &ground, points: &points, standing: &standing };
-    let violations = verify(lights, &evidence);
+    let standing = points_of_lights(&hidden.light_of_point, lights.len());
+    let violations = std::mem::take(&mut hidden.violations);
 
     clock.stage("samples");
     let accused = accusations(&patches, lights, violations);

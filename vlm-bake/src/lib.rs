@@ -19,6 +19,7 @@ pub mod planar;
 pub mod slivers;
 pub mod surface;
 pub mod correspondence;
+pub mod standing;
 pub mod clearance;
 pub mod signed_distance;
 pub mod way_out;

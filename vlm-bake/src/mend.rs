@@ -8,16 +8,16 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::clearance::rise;
-use crate::correspondence::{Correspondence, Light, points_of_lights};
+use crate::correspondence::Light;
 use crate::decimate::LightMesh;
-use crate::ground::Ground;
-use crate::offset::{Surroundings, offset};
+use crate::offset::{Offset, Surroundings};
 use crate::refine::Refiner;
 use crate::scene::Scene;
 use crate::slivers::MAX_ASPECT;
+use crate::standing::Standing;
 use crate::surface::SurfacePoint;
 use crate::topology::aspect_ratio;
-use crate::verify::judge::{Evidence, Violation, judge, verify};
+use crate::verify::judge::{Evidence, Violation, judge};
 use crate::write::as_stored;
 
 /// Share of the budget that is kept for lights that fail. Higher values leave fewer of them, and larger lights everywhere else.
@@ -44,7 +44,7 @@ const MARGIN: f64 = 1.05;
 /// Lights that hide as far as they can.
 #[derive(Clone, Debug, Default)]
 pub struct Hidden {
-    /// The lights in place.
+    /// The lights in place, as the file will hold them: rounded to single precision in the space of their node.
     pub lights: Vec<Light>,
     /// The face of the decimated mesh of which each is a part.
     pub coarse: Vec<u32>,
@@ -52,115 +52,80 @@ pub struct Hidden {
     pub depths: Vec<f64>,
     /// The area of each at rest, square metres.
     pub rest_areas: Vec<f64>,
+    /// The light that stands for each point.
+    pub light_of_point: Vec<Option<u32>>,
+    /// The lights that fail all the same, ascending.
+    pub violations: Vec<Violation>,
 }
 
-/// Refines to the budget and hides the lights.
+/// Refines to the budget and hides the lights from `points`.
 #[must_use]
-pub fn mend(mut refiner: Refiner, budget: usize, around: &Surroundings) -> Hidden {
+pub fn mend(
+    scene: &Scene,
+    mut refiner: Refiner,
+    budget: usize,
+    around: &Surroundings,
+    points: &[SurfacePoint],
+) -> Hidden {
+    let ground = around.ground;
     refiner.to_budget((budget as f64 * (1.0 - MENDING_SHARE)) as usize);
-    let fewer = thinned(around.points, budget);
-    let roughly = Surroundings { points: &fewer, ..*around };
+    let mut offset = Offset::default();
+    let fewer = thinned(points, budget);
+    let mut roughly = Standing::new(&fewer);
+    let mut judged = Vec::new();
     for _ in 0..ROUNDS {
         let room = budget.saturating_sub(refiner.lights());
         if room == 0 {
             break;
         }
-        let (mesh, emits) = in_place(&refiner, &roughly);
-        let lights = mesh.lights();
-        let failing = look(&lights, &emits, &roughly, |lights, evidence| {
-            for f in (0..lights.len()).filter(|&f| evidence.own_points(f).next().is_none()) {
-                refiner.density[f] = 0.0;
-            }
-            curable(lights, evidence)
-        });
+        place(&refiner, around, &mut offset, &mut roughly);
+        let standing = roughly.lists();
+        for f in (0..refiner.density.len()).filter(|&f| standing.of(f).is_empty()) {
+            refiner.density[f] = 0.0;
+        }
+        let lights = offset.mesh.lights();
+        let evidence = Evidence { ground, points: &fewer, standing: &standing };
+        let failing = curable(&lights, &evidence, |l| judged.get(l) != Some(&lights[l]));
         if failing.is_empty() {
             break;
         }
         cut(&mut refiner, &lights, failing, room);
+        judged = lights;
     }
     refiner.to_budget(budget);
-    let (mesh, emits) = in_place(&refiner, around);
-    let mut lights = mesh.lights();
-    let mended = look(&lights, &emits, around, |lights, evidence| {
-        let failing = curable(lights, evidence);
-        let mended = |v: &Violation| Some((v.light, shrunk(v.light, lights, evidence, around.deepest)?));
-        failing.par_iter().filter_map(mended).collect::<Vec<_>>()
-    });
-    for (l, light) in mended {
-        lights[l as usize] = light;
-    }
-    collect(&refiner, lights, &emits)
+    let mut standing = Standing::new(points);
+    let emits = place(&refiner, around, &mut offset, &mut standing);
+    finish(scene, &refiner, &offset.mesh, &emits, around, standing)
 }
 
 /// Every n-th point, enough of them to see which lights fail badly.
-fn thinned(points: &[SurfacePoint], budget: usize) -> Vec<SurfacePoint> {
-    let enough = (ROUGH_POINTS_PER_LIGHT * budget).max(LEAST_ROUGH_POINTS);
+#[must_use]
+pub fn thinned(points: &[SurfacePoint], lights: usize) -> Vec<SurfacePoint> {
+    let enough = (ROUGH_POINTS_PER_LIGHT * lights).max(LEAST_ROUGH_POINTS);
     // An odd step, since the two sides of two-sided surfaces take turns.
     points.iter().step_by(points.len().div_ceil(enough) | 1).copied().collect()
 }
 
-/// The lights as the file will hold them, rounded to single precision in the space of their node, without those that would be too thin
-/// or stand for no surface; and the light that stands for each point.
-#[must_use]
-pub fn kept(
-    scene: &Scene,
-    ground: &Ground,
-    points: &[SurfacePoint],
-    hidden: Hidden,
-) -> (Hidden, Vec<Option<u32>>) {
-    let Hidden { mut lights, coarse, depths, rest_areas } = hidden;
-    lights.par_iter_mut().for_each(|light| {
-        let object = &scene.objects[ground.objects[light.region as usize] as usize];
-        light.corners = as_stored(object.world_from_node, light.corners);
-    });
-    let shaped: Vec<bool> = lights.iter().map(|l| aspect_ratio(l.corners) <= MAX_ASPECT).collect();
-    let mut light_of_point = Correspondence::new(ground, &lights, |l| shaped[l]).of(points);
-    let standing = points_of_lights(&light_of_point, lights.len());
-    let chosen: Vec<usize> = (0..lights.len()).filter(|&l| !standing.of(l).is_empty()).collect();
-    let mut number = vec![0; lights.len()];
-    for (new, &old) in (0..).zip(&chosen) {
-        number[old] = new;
-    }
-    light_of_point.iter_mut().flatten().for_each(|light| *light = number[*light as usize]);
-    let hidden = Hidden {
-        lights: chosen.iter().map(|&l| lights[l]).collect(),
-        coarse: chosen.iter().map(|&l| coarse[l]).collect(),
-        depths: chosen.iter().map(|&l| depths[l]).collect(),
-        rest_areas: chosen.iter().map(|&l| rest_areas[l]).collect(),
-    };
-    (hidden, light_of_point)
-}
-
-/// The mesh with its vertices where they hide best, and which faces make lights there.
-fn in_place(refiner: &Refiner, around: &Surroundings) -> (LightMesh, Vec<bool>) {
-    let mut mesh = refiner.mesh.clone();
+/// Puts the vertices where they hide best; returns which faces make lights there.
+fn place(refiner: &Refiner, around: &Surroundings, offset: &mut Offset, standing: &mut Standing) -> Vec<bool> {
     let emits: Vec<bool> = refiner.density.iter().map(|&density| density > 0.0).collect();
-    offset(&mut mesh, &refiner.mesh.positions, &emits, around);
-    let shaped = |f: usize| emits[f] && aspect_ratio(mesh.corners(f)) <= MAX_ASPECT;
-    let emits = (0..mesh.faces.len()).map(shaped).collect();
-    (mesh, emits)
+    offset.place(&refiner.mesh, &emits, around, standing);
+    let mesh = &offset.mesh;
+    let emits: Vec<bool> =
+        (0..mesh.faces.len()).map(|f| emits[f] && aspect_ratio(mesh.corners(f)) <= MAX_ASPECT).collect();
+    standing.update(around.ground, &mesh.lights(), &emits);
+    emits
 }
 
-/// Shows the lights and what they stand for to `what`.
-fn look<T>(
-    lights: &[Light],
-    emits: &[bool],
-    around: &Surroundings,
-    what: impl FnOnce(&[Light], &Evidence) -> T,
-) -> T {
-    let correspondence = Correspondence::new(around.ground, lights, |l| emits[l]);
-    let standing = points_of_lights(&correspondence.of(around.points), lights.len());
-    let evidence = Evidence { ground: around.ground, points: around.points, standing: &standing };
-    what(lights, &evidence)
-}
-
-/// The lights that fail, but those of two-sided surfaces, behind which nothing can hide.
-fn curable(lights: &[Light], evidence: &Evidence) -> Vec<Violation> {
-    let mut failing = verify(lights, evidence);
-    let one_sided =
-        |v: &Violation| !evidence.ground.patches.regions[lights[v.light as usize].region as usize].two_sided;
-    failing.retain(one_sided);
-    failing
+/// The failing ones among some lights, but for those of two-sided surfaces, behind which nothing can hide.
+fn curable(lights: &[Light], evidence: &Evidence, some: impl Fn(usize) -> bool + Sync) -> Vec<Violation> {
+    let regions = &evidence.ground.patches.regions;
+    let one_sided = |l: usize| !regions[lights[l].region as usize].two_sided;
+    (0..lights.len())
+        .into_par_iter()
+        .filter(|&l| one_sided(l) && some(l))
+        .filter_map(|l| judge(l, &lights[l], evidence))
+        .collect()
 }
 
 /// Cuts the largest of the failing lights.
@@ -174,6 +139,78 @@ fn cut(refiner: &mut Refiner, lights: &[Light], mut failing: Vec<Violation>, roo
         }
         refiner.cut_face(violation.light);
     }
+}
+
+/// The lights as the file will hold them, sunk or shrunk where they fail by themselves; without those that would be too thin or stand for
+/// no surface.
+fn finish(
+    scene: &Scene,
+    refiner: &Refiner,
+    mesh: &LightMesh,
+    emits: &[bool],
+    around: &Surroundings,
+    mut standing: Standing,
+) -> Hidden {
+    let ground = around.ground;
+    let stored = |light: &mut Light| {
+        let object = &scene.objects[ground.objects[light.region as usize] as usize];
+        light.corners = as_stored(object.world_from_node, light.corners);
+    };
+    let placed = mesh.lights();
+    let mut lights = placed.clone();
+    lights.par_iter_mut().for_each(stored);
+    let lists = standing.lists();
+    let evidence = Evidence { ground, points: standing.points, standing: &lists };
+    let mut verdicts: Vec<Option<Violation>> =
+        lights.par_iter().enumerate().map(|(l, light)| judge(l, light, &evidence)).collect();
+    let shrink = |l: usize| {
+        verdicts[l].as_ref().filter(|_| !ground.patches.regions[lights[l].region as usize].two_sided)?;
+        let mut light = shrunk(l as u32, &lights, &evidence, around.deepest)?;
+        stored(&mut light);
+        Some((l, light))
+    };
+    let mended: Vec<(usize, Light)> = (0..lights.len()).into_par_iter().filter_map(shrink).collect();
+    let mut moved = placed;
+    for (l, light) in mended {
+        (moved[l], lights[l]) = (light, light);
+        verdicts[l] = None;
+    }
+    let emits: Vec<bool> =
+        emits.iter().zip(&lights).map(|(&emits, l)| emits && aspect_ratio(l.corners) <= MAX_ASPECT).collect();
+    let before = standing.light_of_point.clone();
+    standing.update(ground, &moved, &emits);
+    let lists = standing.lists();
+    let evidence = Evidence { ground, points: standing.points, standing: &lists };
+    for l in differing(&before, &standing.light_of_point) {
+        verdicts[l as usize] = judge(l as usize, &lights[l as usize], &evidence);
+    }
+    let depth = |l: usize| {
+        let centre = |corners: [DVec3; 3]| corners.iter().sum::<DVec3>() / 3.0;
+        (centre(refiner.mesh.corners(l)) - centre(lights[l].corners)).dot(lights[l].normal())
+    };
+    let chosen: Vec<usize> = (0..lights.len()).filter(|&l| !lists.of(l).is_empty()).collect();
+    let mut number = vec![0; lights.len()];
+    for (new, &old) in (0..).zip(&chosen) {
+        number[old] = new;
+    }
+    let renumbered = |l: usize| Some(Violation { light: number[l], ..verdicts[l].clone()? });
+    Hidden {
+        lights: chosen.iter().map(|&l| lights[l]).collect(),
+        coarse: chosen.iter().map(|&l| refiner.mesh.faces[l].coarse).collect(),
+        depths: chosen.iter().map(|&l| depth(l)).collect(),
+        rest_areas: chosen.iter().map(|&l| refiner.mesh.area(l)).collect(),
+        light_of_point: standing.light_of_point.iter().map(|l| Some(number[(*l)? as usize])).collect(),
+        violations: chosen.iter().filter_map(|&l| renumbered(l)).collect(),
+    }
+}
+
+/// The lights that gained or lost a point, ascending.
+fn differing(before: &[Option<u32>], after: &[Option<u32>]) -> Vec<u32> {
+    let pairs = before.iter().zip(after).filter(|(before, after)| before != after);
+    let mut lights: Vec<u32> = pairs.flat_map(|(before, after)| [*before, *after]).flatten().collect();
+    lights.sort_unstable();
+    lights.dedup();
+    lights
 }
 
 /// A failing light sunk along its normal, or as large as it can be without failing; `None` if no size helps.
@@ -192,21 +229,4 @@ fn shrunk(number: u32, lights: &[Light], evidence: &Evidence, deepest: f64) -> O
             && judge(number as usize, &sunk, evidence).is_none();
         hides.then_some(sunk)
     })
-}
-
-/// The lights of the faces that emit.
-fn collect(refiner: &Refiner, lights: Vec<Light>, emits: &[bool]) -> Hidden {
-    let mut hidden = Hidden::default();
-    for (f, light) in lights.into_iter().enumerate() {
-        if !emits[f] {
-            continue;
-        }
-        let centre = |corners: [DVec3; 3]| corners.iter().sum::<DVec3>() / 3.0;
-        let moved = centre(refiner.mesh.corners(f)) - centre(light.corners);
-        hidden.depths.push(moved.dot(light.normal()));
-        hidden.rest_areas.push(refiner.mesh.area(f));
-        hidden.coarse.push(refiner.mesh.faces[f].coarse);
-        hidden.lights.push(light);
-    }
-    hidden
 }
