@@ -1,7 +1,7 @@
 //! Which light stands for each point, kept up to date while lights move.
 //!
 //! A search of every point's light costs more than all else that hides lights. So only points whose own light changed look
-//! again, and those that have none. A point whose light stayed keeps it, though another may have come nearer by a
+//! again, and those that have none look among the lights that changed. A point whose light stayed keeps it, though another may have come nearer by a
 //! clearance or so; the proof of the finished file looks for every point anew.
 
 use rayon::prelude::*;
@@ -36,11 +36,12 @@ impl<'a> Standing<'a> {
         if !changed.contains(&true) {
             return;
         }
-        let search = Correspondence::new(ground, lights, |l| emits[l]);
-        self.light_of_point.par_iter_mut().zip(self.points).for_each(|(light, point)| {
-            if light.is_none_or(|light| changed[light as usize]) {
-                *light = search.light_of(point);
-            }
+        let all = Correspondence::new(ground, lights, |l| emits[l]);
+        let moved = Correspondence::new(ground, lights, |l| emits[l] && changed[l]);
+        self.light_of_point.par_iter_mut().zip(self.points).for_each(|(light, point)| match *light {
+            None => *light = moved.light_of(point),
+            Some(old) if changed[old as usize] => *light = all.light_of(point),
+            Some(_) => {}
         });
     }
 
