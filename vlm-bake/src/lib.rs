@@ -26,6 +26,7 @@ pub mod way_out;
 pub mod ground;
 pub mod refine;
 pub mod offset;
+pub mod fit;
 pub mod mend;
 pub mod verify;
 pub mod samples;

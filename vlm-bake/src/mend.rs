@@ -1,15 +1,14 @@
 //! Stage 6: hides the lights behind their surface, and refines where that fails.
 //!
 //! Each round offsets the mesh anew and looks which lights fail. A light that lies across a bend is cut there: its parts
-//! follow the surface, and so need less depth. What still fails when the budget is spent sinks or shrinks by itself; a light of half
-//! the size reaches half as high over its points' horizons, and a larger radiosity keeps its flux.
+//! follow the surface, and so need less depth. What still fails when the budget is spent is fitted by itself ([`mod@crate::fit`]).
 
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::clearance::rise;
 use crate::correspondence::Light;
 use crate::decimate::LightMesh;
+use crate::fit::fitted;
 use crate::offset::{Offset, Surroundings};
 use crate::refine::Refiner;
 use crate::scene::Scene;
@@ -32,14 +31,8 @@ const ROUGH_POINTS_PER_LIGHT: usize = 20;
 /// The least number of these points.
 const LEAST_ROUGH_POINTS: usize = 20_000;
 
-/// The sizes to which a light may shrink, largest first. Below half, the rest of its surface would be lit from too small a place.
-const SIZES: [f64; 4] = [1.0, 0.85, 0.7, 0.5];
-
-/// A light sinks by itself by at most this share of its longest edge, for the reason that vertices move by no more.
-const SINK_SHARE: f64 = 0.4;
-
-/// A shrunk light lies this many times the required clearance behind its surface, so that rounding does not fail it.
-const MARGIN: f64 = 1.05;
+/// Rounds of fitting lights that fail: what one gives up may be too much for its neighbour.
+const FITS: usize = 4;
 
 /// Lights that hide as far as they can.
 #[derive(Clone, Debug, Default)]
@@ -156,33 +149,43 @@ fn finish(
         let object = &scene.objects[ground.objects[light.region as usize] as usize];
         light.corners = as_stored(object.world_from_node, light.corners);
     };
-    let placed = mesh.lights();
+    // As they are, by which points find them, and as the file will hold them.
+    let mut placed = mesh.lights();
     let mut lights = placed.clone();
     lights.par_iter_mut().for_each(stored);
-    let lists = standing.lists();
-    let evidence = Evidence { ground, points: standing.points, standing: &lists };
-    let mut verdicts: Vec<Option<Violation>> =
-        lights.par_iter().enumerate().map(|(l, light)| judge(l, light, &evidence)).collect();
-    let shrink = |l: usize| {
-        verdicts[l].as_ref().filter(|_| !ground.patches.regions[lights[l].region as usize].two_sided)?;
-        let mut light = shrunk(l as u32, &lights, &evidence, around.deepest)?;
-        stored(&mut light);
-        Some((l, light))
-    };
-    let mended: Vec<(usize, Light)> = (0..lights.len()).into_par_iter().filter_map(shrink).collect();
-    let mut moved = placed;
-    for (l, light) in mended {
-        (moved[l], lights[l]) = (light, light);
-        verdicts[l] = None;
-    }
-    let emits: Vec<bool> =
-        emits.iter().zip(&lights).map(|(&emits, l)| emits && aspect_ratio(l.corners) <= MAX_ASPECT).collect();
-    let before = standing.light_of_point.clone();
-    standing.update(ground, &moved, &emits);
-    let lists = standing.lists();
-    let evidence = Evidence { ground, points: standing.points, standing: &lists };
-    for l in differing(&before, &standing.light_of_point) {
-        verdicts[l as usize] = judge(l as usize, &lights[l as usize], &evidence);
+    let mut emits = emits.to_vec();
+    let mut verdicts: Vec<Option<Violation>> = vec![None; lights.len()];
+    let mut lists = standing.lists();
+    let mut doubtful: Vec<usize> = (0..lights.len()).collect();
+    for round in 0..=FITS {
+        let evidence = Evidence { ground, points: standing.points, standing: &lists };
+        let judged: Vec<_> = doubtful.par_iter().map(|&l| judge(l, &lights[l], &evidence)).collect();
+        for (&l, verdict) in doubtful.iter().zip(judged) {
+            verdicts[l] = verdict;
+        }
+        if round == FITS {
+            break;
+        }
+        let fit = |&l: &usize| {
+            verdicts[l].as_ref().filter(|_| !ground.patches.regions[lights[l].region as usize].two_sided)?;
+            let mut light = fitted(&lights[l], &evidence.own_points(l), &evidence, around.deepest)?;
+            stored(&mut light);
+            Some((l, light))
+        };
+        let fits: Vec<(usize, Light)> = doubtful.par_iter().filter_map(fit).collect();
+        for &(l, light) in &fits {
+            (placed[l], lights[l]) = (light, light);
+        }
+        for l in doubtful {
+            emits[l] = emits[l] && aspect_ratio(lights[l].corners) <= MAX_ASPECT;
+        }
+        let before = standing.light_of_point.clone();
+        standing.update(ground, &placed, &emits);
+        lists = standing.lists();
+        doubtful = differing(&before, &standing.light_of_point);
+        doubtful.extend(fits.iter().map(|(l, _)| *l));
+        doubtful.sort_unstable();
+        doubtful.dedup();
     }
     let depth = |l: usize| {
         let centre = |corners: [DVec3; 3]| corners.iter().sum::<DVec3>() / 3.0;
@@ -205,28 +208,11 @@ fn finish(
 }
 
 /// The lights that gained or lost a point, ascending.
-fn differing(before: &[Option<u32>], after: &[Option<u32>]) -> Vec<u32> {
+fn differing(before: &[Option<u32>], after: &[Option<u32>]) -> Vec<usize> {
     let pairs = before.iter().zip(after).filter(|(before, after)| before != after);
-    let mut lights: Vec<u32> = pairs.flat_map(|(before, after)| [*before, *after]).flatten().collect();
+    let mut lights: Vec<usize> =
+        pairs.flat_map(|(before, after)| [*before, *after]).flatten().map(|l| l as usize).collect();
     lights.sort_unstable();
     lights.dedup();
     lights
-}
-
-/// A failing light sunk along its normal, or as large as it can be without failing; `None` if no size helps.
-fn shrunk(number: u32, lights: &[Light], evidence: &Evidence, deepest: f64) -> Option<Light> {
-    let light = &lights[number as usize];
-    let (normal, centre) = (light.normal(), light.corners.iter().sum::<DVec3>() / 3.0);
-    let target = MARGIN * evidence.ground.clearance;
-    SIZES.iter().find_map(|&size| {
-        let smaller = light.corners.map(|v| centre + (v - centre) * size);
-        let needed = |point: &SurfacePoint| {
-            (rise(&smaller, point.position, point.normal) + target) / point.normal.dot(normal)
-        };
-        let depth = evidence.own_points(number as usize).map(needed).fold(f64::NEG_INFINITY, f64::max);
-        let sunk = Light { corners: smaller.map(|v| v - normal * depth), ..*light };
-        let hides = depth.abs() <= deepest.min(SINK_SHARE * light.longest_edge())
-            && judge(number as usize, &sunk, evidence).is_none();
-        hides.then_some(sunk)
-    })
 }
