@@ -31,8 +31,14 @@ use crate::verify::Verification;
 use crate::write::{order, placeable};
 
 /// Lights sink by at most this many times the clearance and the mean distance between faces and their surface together. Higher values
-/// hide more lights behind bumpy surface instead of tagging them, and put all of them deeper there, where they fit their surface less.
-const DEEPEST: f64 = 16.0;
+/// hide more lights behind bumpy surface instead of shrinking them, and put all of them deeper there, where they fit their surface less.
+const DEEPEST_OF_MEAN: f64 = 16.0;
+
+/// Likewise, times the clearance and the simplifier's error together: their mean depth is then below 1.5 times that.
+const DEEPEST_OF_ERROR: f64 = 1.1;
+
+/// Likewise, times the clearance: what a corner of three walls needs, and a little more.
+const LEAST_DEEPEST: f64 = 2.0;
 
 /// An asset and how it came about.
 #[derive(Clone, Debug, Default)]
@@ -88,7 +94,7 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let fewer = thinned(&points, coarse.len());
     let light_of_point = Correspondence::new(&ground, &coarse, |_| true).of(&fewer);
     let distance = measured_distance(&fewer, &light_of_point, &coarse);
-    let deepest = DEEPEST * (ground.clearance + distance.mean_m);
+    let deepest = deepest(ground.clearance, distance.mean_m, decimation.error_m);
     let around = Surroundings { ground: &ground, deepest };
     let snap = Snap::new(&patches);
     let density = densities(scene, &patches, &mesh, &points_of_lights(&light_of_point, coarse.len()));
@@ -182,6 +188,12 @@ fn measured_distance(points: &[SurfacePoint], light_of_point: &[Option<u32>], fa
         below >= 0.99 * area
     });
     Distance { mean_m, p99_m: p99.map_or(0.0, |(_, d)| *d) }
+}
+
+/// No light sinks farther than this, metres.
+fn deepest(clearance: f64, mean: f64, error: f64) -> f64 {
+    let most = (DEEPEST_OF_MEAN * (clearance + mean)).min(DEEPEST_OF_ERROR * (clearance + error));
+    most.max(LEAST_DEEPEST * clearance)
 }
 
 /// The artist's density per face; 0 where a face stands for nothing, or where the offset made it too thin to be a light.

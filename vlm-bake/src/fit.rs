@@ -14,7 +14,7 @@ use crate::verify::judge::{Evidence, hides};
 
 /// The sizes to which a light may shrink, largest first. Smaller ones hide more lights instead of tagging them, and let their surface's light
 /// come from too small a place, which is seen from near by.
-const SIZES: [f64; 8] = [1.0, 0.85, 0.7, 0.5, 0.35, 0.25, 0.17, 0.12];
+const SIZES: [f64; 10] = [1.0, 0.85, 0.7, 0.5, 0.35, 0.25, 0.17, 0.12, 0.08, 0.05];
 
 /// Down to this size a light stays over the middle of where it was; smaller ones may move to any part of what it stood for.
 const STAYS: f64 = 0.5;
@@ -58,19 +58,27 @@ fn sunk(light: &Light, own: &[&SurfacePoint], evidence: &Evidence, deepest: f64)
     let target = MARGIN * evidence.ground.clearance;
     let mut standing: Vec<&SurfacePoint> = own.to_vec();
     let mut sunk = *light;
+    let mut below_island = f64::NEG_INFINITY;
     // Deeper, it may reach fewer points, and need less depth: once is enough to leave the far ones out.
     for _ in 0..2 {
         standing.retain(|p| p.normal.dot(normal) > LEAST_COSINE && distance(&sunk, p) <= size);
-        let needed = |p: &&SurfacePoint| {
-            (rise(&light.corners, p.position, p.normal) + target) / p.normal.dot(normal)
-        };
-        let depth = standing.iter().map(needed).fold(f64::NEG_INFINITY, f64::max);
+        let needed =
+            |p: &&SurfacePoint| (rise(&light.corners, p.position, p.normal) + target) / p.normal.dot(normal);
+        let depth = standing.iter().map(needed).fold(below_island, f64::max);
         if depth.abs() > deepest.min(SINK_SHARE * size) {
             return None;
         }
         sunk.corners = light.corners.map(|v| v - normal * depth);
+        below_island = depth + island_rise(&sunk, evidence) + target;
     }
     hides(&sunk, &standing, evidence).then_some(sunk)
+}
+
+/// How far the corners rise above the island of a light, metres; negative where all lie below.
+fn island_rise(light: &Light, evidence: &Evidence) -> f64 {
+    let island = evidence.ground.patches.regions[light.region as usize].island;
+    let signed = |v: &DVec3| Some(evidence.ground.distance.at(*v, island)?.signed);
+    light.corners.iter().filter_map(signed).fold(f64::NEG_INFINITY, f64::max)
 }
 
 fn distance(light: &Light, point: &SurfacePoint) -> f64 {

@@ -31,8 +31,12 @@ const ROUGH_POINTS_PER_LIGHT: usize = 20;
 /// The least number of these points.
 const LEAST_ROUGH_POINTS: usize = 20_000;
 
-/// Rounds of fitting lights that fail: what one gives up may be too much for its neighbour.
-const FITS: usize = 4;
+/// Rounds of fitting lights that fail: what one gives up may be too much for its neighbour. Each has about half as many as the one before.
+const FITS: usize = 12;
+
+/// A light that fails all the same is left out where it stands for less surface than this share of its own area: a tag would be all that it
+/// adds. Higher values leave more of the surface without a light instead of tagging it.
+const LEAST_SHARE: f64 = 0.05;
 
 /// Lights that hide as far as they can.
 #[derive(Clone, Debug, Default)]
@@ -100,7 +104,12 @@ pub fn thinned(points: &[SurfacePoint], lights: usize) -> Vec<SurfacePoint> {
 }
 
 /// Puts the vertices where they hide best; returns which faces make lights there.
-fn place(refiner: &Refiner, around: &Surroundings, offset: &mut Offset, standing: &mut Standing) -> Vec<bool> {
+fn place(
+    refiner: &Refiner,
+    around: &Surroundings,
+    offset: &mut Offset,
+    standing: &mut Standing,
+) -> Vec<bool> {
     let emits: Vec<bool> = refiner.density.iter().map(|&density| density > 0.0).collect();
     offset.place(&refiner.mesh, &emits, around, standing);
     let mesh = &offset.mesh;
@@ -173,6 +182,9 @@ fn finish(
             Some((l, light))
         };
         let fits: Vec<(usize, Light)> = doubtful.par_iter().filter_map(fit).collect();
+        if fits.is_empty() {
+            break;
+        }
         for &(l, light) in &fits {
             (placed[l], lights[l]) = (light, light);
         }
@@ -191,18 +203,23 @@ fn finish(
         let centre = |corners: [DVec3; 3]| corners.iter().sum::<DVec3>() / 3.0;
         (centre(refiner.mesh.corners(l)) - centre(lights[l].corners)).dot(lights[l].normal())
     };
-    let chosen: Vec<usize> = (0..lights.len()).filter(|&l| !lists.of(l).is_empty()).collect();
-    let mut number = vec![0; lights.len()];
+    let worth = |l: usize| {
+        let own = lists.of(l).iter().map(|&p| standing.points[p as usize].area);
+        let two_sided = ground.patches.regions[lights[l].region as usize].two_sided;
+        two_sided || verdicts[l].is_none() || own.sum::<f64>() > LEAST_SHARE * lights[l].area()
+    };
+    let chosen: Vec<usize> = (0..lights.len()).filter(|&l| !lists.of(l).is_empty() && worth(l)).collect();
+    let mut number = vec![None; lights.len()];
     for (new, &old) in (0..).zip(&chosen) {
-        number[old] = new;
+        number[old] = Some(new);
     }
-    let renumbered = |l: usize| Some(Violation { light: number[l], ..verdicts[l].clone()? });
+    let renumbered = |l: usize| Some(Violation { light: number[l]?, ..verdicts[l].clone()? });
     Hidden {
         lights: chosen.iter().map(|&l| lights[l]).collect(),
         coarse: chosen.iter().map(|&l| refiner.mesh.faces[l].coarse).collect(),
         depths: chosen.iter().map(|&l| depth(l)).collect(),
         rest_areas: chosen.iter().map(|&l| refiner.mesh.area(l)).collect(),
-        light_of_point: standing.light_of_point.iter().map(|l| Some(number[(*l)? as usize])).collect(),
+        light_of_point: standing.light_of_point.iter().map(|l| number[(*l)? as usize]).collect(),
         violations: chosen.iter().filter_map(|&l| renumbered(l)).collect(),
     }
 }

@@ -81,7 +81,13 @@ pub struct Offset {
 impl Offset {
     /// Moves the vertices of a mesh from their places of `rest`. `emits` is false for faces that make no lights. Faces of two-sided
     /// surfaces stay where they are: no place behind hides them, so they are tagged later. `standing` follows.
-    pub fn place(&mut self, rest: &LightMesh, emits: &[bool], around: &Surroundings, standing: &mut Standing) {
+    pub fn place(
+        &mut self,
+        rest: &LightMesh,
+        emits: &[bool],
+        around: &Surroundings,
+        standing: &mut Standing,
+    ) {
         let mut dirty = self.take(rest, emits, around);
         let rest = &rest.positions;
         let limits =
@@ -137,11 +143,8 @@ impl Offset {
             if !self.emits[f] || around.ground.patches.regions[face.region as usize].two_sided {
                 continue;
             }
-            let plane = Plane {
-                normal: rest.normal(f),
-                depth: MARGIN * around.ground.clearance,
-                triangle: u32::MAX,
-            };
+            let plane =
+                Plane { normal: rest.normal(f), depth: MARGIN * around.ground.clearance, triangle: u32::MAX };
             for v in face.vertices.into_iter().filter(|v| vertices.binary_search(v).is_ok()) {
                 self.planes[v as usize].push(plane);
             }

@@ -29,7 +29,8 @@ impl<'a> Standing<'a> {
 
     /// Takes the lights as they are now, of which those that `emits` names count; numbers stay, and new ones come last.
     pub fn update(&mut self, ground: &Ground, lights: &[Light], emits: &[bool]) {
-        let now: Vec<Option<Light>> = lights.iter().zip(emits).map(|(l, &emits)| emits.then_some(*l)).collect();
+        let now: Vec<Option<Light>> =
+            lights.iter().zip(emits).map(|(l, &emits)| emits.then_some(*l)).collect();
         let changed: Vec<bool> =
             now.iter().enumerate().map(|(l, light)| self.lights.get(l) != Some(light)).collect();
         self.lights = now;

@@ -107,7 +107,8 @@ pub fn hides(light: &Light, own: &[&SurfacePoint], evidence: &Evidence) -> bool 
     if let Some(region) = evidence.region(light).filter(|_| !violation.pokes_out) {
         poke_beside(light, region.island, evidence, &mut violation);
     }
-    !violation.pokes_out && !own.iter().any(|point| pokes_from(light, point, evidence, &mut Vec::new()).is_some())
+    !violation.pokes_out
+        && !own.iter().any(|point| pokes_from(light, point, evidence, &mut Vec::new()).is_some())
 }
 
 impl Violation {
@@ -179,7 +180,12 @@ fn poke_between(light: &Light, own: &[&SurfacePoint], evidence: &Evidence, viola
 
 /// The length of the way from a point to the nearest place of its light, metres, if it leads out; then adds the triangles that must
 /// not be lit.
-fn pokes_from(light: &Light, point: &SurfacePoint, evidence: &Evidence, triangles: &mut Vec<u32>) -> Option<f64> {
+fn pokes_from(
+    light: &Light,
+    point: &SurfacePoint,
+    evidence: &Evidence,
+    triangles: &mut Vec<u32>,
+) -> Option<f64> {
     let from = point.inner;
     let corners = light.corners.map(|v| (v - from).as_vec3a());
     let way = Vec3::from(closest_point(&corners, Vec3A::ZERO)).as_dvec3();

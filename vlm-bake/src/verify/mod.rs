@@ -176,12 +176,7 @@ pub fn check(
 }
 
 /// What is wrong with a light of an asset, if anything; whether a tag mends it is not known yet.
-fn finding(
-    scene: &Scene,
-    number: usize,
-    placed: &Placed,
-    evidence: &Evidence,
-) -> Option<Finding> {
+fn finding(scene: &Scene, number: usize, placed: &Placed, evidence: &Evidence) -> Option<Finding> {
     let light = &placed.light;
     let bare = Finding {
         light: number as u32,
