@@ -34,11 +34,12 @@ use crate::write::{order, placeable};
 /// hide more lights behind bumpy surface instead of shrinking them, and put all of them deeper there, where they fit their surface less.
 const DEEPEST_OF_MEAN: f64 = 16.0;
 
-/// Likewise, times the clearance and the simplifier's error together: their mean depth is then below 1.5 times that.
-const DEEPEST_OF_ERROR: f64 = 1.1;
+/// Likewise, times the simplifier's error, on top of [`DEEPEST_OF_CLEARANCE`]: their mean depth is then below 1.5 times the error and the
+/// clearance.
+const DEEPEST_OF_ERROR: f64 = 1.05;
 
-/// Likewise, times the clearance: what a corner of three walls needs, and a little more.
-const LEAST_DEEPEST: f64 = 2.0;
+/// Times the clearance: twice what a corner of three walls needs.
+const DEEPEST_OF_CLEARANCE: f64 = 4.0;
 
 /// An asset and how it came about.
 #[derive(Clone, Debug, Default)]
@@ -192,8 +193,8 @@ fn measured_distance(points: &[SurfacePoint], light_of_point: &[Option<u32>], fa
 
 /// No light sinks farther than this, metres.
 fn deepest(clearance: f64, mean: f64, error: f64) -> f64 {
-    let most = (DEEPEST_OF_MEAN * (clearance + mean)).min(DEEPEST_OF_ERROR * (clearance + error));
-    most.max(LEAST_DEEPEST * clearance)
+    let of_mean = DEEPEST_OF_MEAN * (clearance + mean);
+    of_mean.min(DEEPEST_OF_ERROR * error + DEEPEST_OF_CLEARANCE * clearance)
 }
 
 /// The artist's density per face; 0 where a face stands for nothing, or where the offset made it too thin to be a light.

@@ -27,6 +27,7 @@ pub mod ground;
 pub mod refine;
 pub mod offset;
 pub mod fit;
+pub mod fitting;
 pub mod mend;
 pub mod verify;
 pub mod samples;

@@ -7,8 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::correspondence::Light;
-use crate::decimate::LightMesh;
-use crate::fit::fitted;
+use crate::fitting::Fitting;
 use crate::offset::{Offset, Surroundings};
 use crate::refine::Refiner;
 use crate::scene::Scene;
@@ -17,7 +16,6 @@ use crate::standing::Standing;
 use crate::surface::SurfacePoint;
 use crate::topology::aspect_ratio;
 use crate::verify::judge::{Evidence, Violation, judge};
-use crate::write::as_stored;
 
 /// Share of the budget that is kept for lights that fail. Higher values leave fewer of them, and larger lights everywhere else.
 const MENDING_SHARE: f64 = 0.2;
@@ -30,9 +28,6 @@ const ROUGH_POINTS_PER_LIGHT: usize = 20;
 
 /// The least number of these points.
 const LEAST_ROUGH_POINTS: usize = 20_000;
-
-/// Rounds of fitting lights that fail: what one gives up may be too much for its neighbour. Each has about half as many as the one before.
-const FITS: usize = 12;
 
 /// A light that fails all the same is left out where it stands for less surface than this share of its own area: a tag would be all that it
 /// adds. Higher values leave more of the surface without a light instead of tagging it.
@@ -92,7 +87,7 @@ pub fn mend(
     refiner.to_budget(budget);
     let mut standing = Standing::new(points);
     let emits = place(&refiner, around, &mut offset, &mut standing);
-    finish(scene, &refiner, &offset.mesh, &emits, around, standing)
+    collect(&refiner, Fitting::new(scene, around, offset.mesh.lights(), emits, standing))
 }
 
 /// Every n-th point, enough of them to see which lights fail badly.
@@ -143,70 +138,17 @@ fn cut(refiner: &mut Refiner, lights: &[Light], mut failing: Vec<Violation>, roo
     }
 }
 
-/// The lights as the file will hold them, sunk or shrunk where they fail by themselves; without those that would be too thin or stand for
-/// no surface.
-fn finish(
-    scene: &Scene,
-    refiner: &Refiner,
-    mesh: &LightMesh,
-    emits: &[bool],
-    around: &Surroundings,
-    mut standing: Standing,
-) -> Hidden {
-    let ground = around.ground;
-    let stored = |light: &mut Light| {
-        let object = &scene.objects[ground.objects[light.region as usize] as usize];
-        light.corners = as_stored(object.world_from_node, light.corners);
-    };
-    // As they are, by which points find them, and as the file will hold them.
-    let mut placed = mesh.lights();
-    let mut lights = placed.clone();
-    lights.par_iter_mut().for_each(stored);
-    let mut emits = emits.to_vec();
-    let mut verdicts: Vec<Option<Violation>> = vec![None; lights.len()];
-    let mut lists = standing.lists();
-    let mut doubtful: Vec<usize> = (0..lights.len()).collect();
-    for round in 0..=FITS {
-        let evidence = Evidence { ground, points: standing.points, standing: &lists };
-        let judged: Vec<_> = doubtful.par_iter().map(|&l| judge(l, &lights[l], &evidence)).collect();
-        for (&l, verdict) in doubtful.iter().zip(judged) {
-            verdicts[l] = verdict;
-        }
-        if round == FITS {
-            break;
-        }
-        let fit = |&l: &usize| {
-            verdicts[l].as_ref().filter(|_| !ground.patches.regions[lights[l].region as usize].two_sided)?;
-            let mut light = fitted(&lights[l], &evidence.own_points(l), &evidence, around.deepest)?;
-            stored(&mut light);
-            Some((l, light))
-        };
-        let fits: Vec<(usize, Light)> = doubtful.par_iter().filter_map(fit).collect();
-        if fits.is_empty() {
-            break;
-        }
-        for &(l, light) in &fits {
-            (placed[l], lights[l]) = (light, light);
-        }
-        for l in doubtful {
-            emits[l] = emits[l] && aspect_ratio(lights[l].corners) <= MAX_ASPECT;
-        }
-        let before = standing.light_of_point.clone();
-        standing.update(ground, &placed, &emits);
-        lists = standing.lists();
-        doubtful = differing(&before, &standing.light_of_point);
-        doubtful.extend(fits.iter().map(|(l, _)| *l));
-        doubtful.sort_unstable();
-        doubtful.dedup();
-    }
+/// The lights that are worth it once all are fitted: without those that would be too thin or stand for no surface.
+fn collect(refiner: &Refiner, mut fitting: Fitting) -> Hidden {
+    let light_of_point = fitting.run();
+    let Fitting { lights, lists, verdicts, .. } = &fitting;
     let depth = |l: usize| {
         let centre = |corners: [DVec3; 3]| corners.iter().sum::<DVec3>() / 3.0;
         (centre(refiner.mesh.corners(l)) - centre(lights[l].corners)).dot(lights[l].normal())
     };
     let worth = |l: usize| {
-        let own = lists.of(l).iter().map(|&p| standing.points[p as usize].area);
-        let two_sided = ground.patches.regions[lights[l].region as usize].two_sided;
-        two_sided || verdicts[l].is_none() || own.sum::<f64>() > LEAST_SHARE * lights[l].area()
+        let own: f64 = lists.of(l).iter().map(|&p| fitting.points()[p as usize].area).sum();
+        fitting.is_two_sided(l) || verdicts[l].is_none() || own > LEAST_SHARE * lights[l].area()
     };
     let chosen: Vec<usize> = (0..lights.len()).filter(|&l| !lists.of(l).is_empty() && worth(l)).collect();
     let mut number = vec![None; lights.len()];
@@ -219,17 +161,7 @@ fn finish(
         coarse: chosen.iter().map(|&l| refiner.mesh.faces[l].coarse).collect(),
         depths: chosen.iter().map(|&l| depth(l)).collect(),
         rest_areas: chosen.iter().map(|&l| refiner.mesh.area(l)).collect(),
-        light_of_point: standing.light_of_point.iter().map(|l| number[(*l)? as usize]).collect(),
+        light_of_point: light_of_point.iter().map(|l| number[(*l)? as usize]).collect(),
         violations: chosen.iter().filter_map(|&l| renumbered(l)).collect(),
     }
-}
-
-/// The lights that gained or lost a point, ascending.
-fn differing(before: &[Option<u32>], after: &[Option<u32>]) -> Vec<usize> {
-    let pairs = before.iter().zip(after).filter(|(before, after)| before != after);
-    let mut lights: Vec<usize> =
-        pairs.flat_map(|(before, after)| [*before, *after]).flatten().map(|l| l as usize).collect();
-    lights.sort_unstable();
-    lights.dedup();
-    lights
 }

@@ -46,6 +46,12 @@ impl<'a> Standing<'a> {
         });
     }
 
+    /// Looks for the light of every point anew among the same lights.
+    pub fn refresh(&mut self, ground: &Ground, lights: &[Light]) {
+        let search = Correspondence::new(ground, lights, |l| self.lights[l].is_some());
+        self.light_of_point = search.of(self.points);
+    }
+
     /// The points of each light.
     #[must_use]
     pub fn lists(&self) -> Lists {
