@@ -101,6 +101,8 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let density = densities(scene, &patches, &mesh, &points_of_lights(&light_of_point, coarse.len()));
     let budget = (options.lights as usize).saturating_sub(authored::count(scene));
     let mut hidden = mend(scene, Refiner::new(mesh, density, &snap), budget, &around, &points);
+
+    clock.stage("verify");
     let lights = &hidden.lights;
     let standing = points_of_lights(&hidden.light_of_point, lights.len());
     let violations = std::mem::take(&mut hidden.violations);

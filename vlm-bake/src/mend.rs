@@ -7,6 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::correspondence::Light;
+use crate::decimate::LightMesh;
 use crate::fitting::Fitting;
 use crate::offset::{Offset, Surroundings};
 use crate::refine::Refiner;
@@ -87,7 +88,7 @@ pub fn mend(
     refiner.to_budget(budget);
     let mut standing = Standing::new(points);
     let emits = place(&refiner, around, &mut offset, &mut standing);
-    collect(&refiner, Fitting::new(scene, around, offset.mesh.lights(), emits, standing))
+    collect(&refiner, &offset.mesh, Fitting::new(scene, around, offset.mesh.lights(), emits, standing))
 }
 
 /// Every n-th point, enough of them to see which lights fail badly.
@@ -139,12 +140,17 @@ fn cut(refiner: &mut Refiner, lights: &[Light], mut failing: Vec<Violation>, roo
 }
 
 /// The lights that are worth it once all are fitted: without those that would be too thin or stand for no surface.
-fn collect(refiner: &Refiner, mut fitting: Fitting) -> Hidden {
+fn collect(refiner: &Refiner, placed: &LightMesh, mut fitting: Fitting) -> Hidden {
     let light_of_point = fitting.run();
     let Fitting { lights, lists, verdicts, .. } = &fitting;
     let depth = |l: usize| {
         let centre = |corners: [DVec3; 3]| corners.iter().sum::<DVec3>() / 3.0;
         (centre(refiner.mesh.corners(l)) - centre(lights[l].corners)).dot(lights[l].normal())
+    };
+    // A fitted light counts for the part of its rest that it kept: how much lights grew is the offset's doing alone.
+    let rest_area = |l: usize| {
+        let area = placed.area(l);
+        refiner.mesh.area(l) * if area > 0.0 { lights[l].area() / area } else { 1.0 }
     };
     let worth = |l: usize| {
         let own: f64 = lists.of(l).iter().map(|&p| fitting.points()[p as usize].area).sum();
@@ -160,7 +166,7 @@ fn collect(refiner: &Refiner, mut fitting: Fitting) -> Hidden {
         lights: chosen.iter().map(|&l| lights[l]).collect(),
         coarse: chosen.iter().map(|&l| refiner.mesh.faces[l].coarse).collect(),
         depths: chosen.iter().map(|&l| depth(l)).collect(),
-        rest_areas: chosen.iter().map(|&l| refiner.mesh.area(l)).collect(),
+        rest_areas: chosen.iter().map(|&l| rest_area(l)).collect(),
         light_of_point: light_of_point.iter().map(|l| number[(*l)? as usize]).collect(),
         violations: chosen.iter().filter_map(|&l| renumbered(l)).collect(),
     }
