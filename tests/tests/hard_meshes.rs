@@ -19,15 +19,12 @@ const BUDGETS: [u32; 3] = [50, 400, 3000];
 /// What the baker misses yet: mesh, budget, fault. A line whose fault is gone fails the test too: take it out.
 const MISSED: &[(&str, u32, &str)] = &[
     ("a_thousandth", 50, "ComesOut"), // 1 light of 50, through the bumps of a ball
-    ("bowl", 3000, "LightsItself"), // 5 lights of 2962 by 0.5 mm, at corners of triangles between the points of the check
+    ("bowl", 3000, "LightsItself"), // a few lights of 2962 by 0.5 mm, at corners of triangles between the points of the check
     // A room's lights grow as they move behind its walls, here by 9 % as the clearance is 10 cm: the radiosity is kept, not the flux.
     ("far_from_the_origin", 50, "Flux"),
     ("far_from_the_origin", 400, "Flux"),
     ("far_from_the_origin", 3000, "Flux"),
     ("folded_sheet", 50, "ComesOut"), // 1 light of 50, over the crease by 1 cm
-    ("folded_sheet", 3000, "ComesOut"), // 1 light of 3006, over the crease by 1 mm
-    ("tube", 50, "Tagged"),           // 77 % of the area: lights are wider than the wall is thick
-    ("spiral_band", 50, "Tagged"),    // 76 % of the area: likewise
 ];
 
 /// Sheets may be tagged whole, and so may a plate thinner than the clearance.

@@ -13,7 +13,7 @@ use crate::decimate::{Decimation, LightMesh, decimate};
 use crate::flux::{conserve, steer};
 use crate::grid::{GridInput, GridOptions, StandIns, grid};
 use crate::ground::Ground;
-use crate::mend::{kept, mend};
+use crate::mend::{mend, thinned};
 use crate::offset::Surroundings;
 use crate::options::BakeOptions;
 use crate::patches::{Patches, patches};
@@ -30,12 +30,18 @@ use crate::surface::SurfacePoint;
 use crate::tag::Tags;
 use crate::topology::{Lists, area, aspect_ratio};
 use crate::verify::Verification;
-use crate::verify::judge::{Evidence, verify};
 use crate::write::{order, placeable};
 
 /// Lights sink by at most this many times the clearance and the mean distance between faces and their surface together. Higher values
-/// hide more lights behind bumpy surface instead of tagging them, and put all of them deeper there, where they fit their surface less.
-const DEEPEST: f64 = 16.0;
+/// hide more lights behind bumpy surface instead of shrinking them, and put all of them deeper there, where they fit their surface less.
+const DEEPEST_OF_MEAN: f64 = 16.0;
+
+/// Likewise, times the simplifier's error, on top of [`DEEPEST_OF_CLEARANCE`]: their mean depth is then below 1.5 times the error and the
+/// clearance.
+const DEEPEST_OF_ERROR: f64 = 1.05;
+
+/// Times the clearance: twice what a corner of three walls needs.
+const DEEPEST_OF_CLEARANCE: f64 = 4.0;
 
 /// An asset and how it came about.
 #[derive(Clone, Debug, Default)]
@@ -90,21 +96,20 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let ground = Ground::new(scene, &patches);
     let coarse = mesh.lights();
     let points = ground.points(options.lights as usize);
-    let light_of_point = Correspondence::new(&ground, &coarse, |_| true).of(&points);
-    let distance = measured_distance(&points, &light_of_point, &coarse);
-    let deepest = DEEPEST * (ground.clearance + distance.mean_m);
-    let around = Surroundings { ground: &ground, points: &points, deepest };
+    let fewer = thinned(&points, coarse.len());
+    let light_of_point = Correspondence::new(&ground, &coarse, |_| true).of(&fewer);
+    let distance = measured_distance(&fewer, &light_of_point, &coarse);
+    let deepest = deepest(ground.clearance, distance.mean_m, decimation.error_m);
+    let around = Surroundings { ground: &ground, deepest };
     let snap = Snap::new(&patches);
     let density = densities(scene, &patches, &mesh, &points_of_lights(&light_of_point, coarse.len()));
     let budget = (options.lights as usize).saturating_sub(authored::count(scene));
-    let hidden = mend(Refiner::new(mesh, density, &snap), budget, &around);
+    let mut hidden = mend(scene, Refiner::new(mesh, density, &snap), budget, &around, &points);
 
     clock.stage("verify");
-    let (hidden, light_of_point) = kept(scene, &ground, &points, hidden);
     let lights = &hidden.lights;
-    let standing = points_of_lights(&light_of_point, lights.len());
-    let evidence = Evidence { ground: &ground, points: &points, standing: &standing };
-    let violations = verify(lights, &evidence);
+    let standing = points_of_lights(&hidden.light_of_point, lights.len());
+    let violations = std::mem::take(&mut hidden.violations);
 
     clock.stage("samples");
     let accused = accusations(&patches, lights, violations);
@@ -203,6 +208,12 @@ fn measured_distance(points: &[SurfacePoint], light_of_point: &[Option<u32>], fa
         below >= 0.99 * area
     });
     Distance { mean_m, p99_m: p99.map_or(0.0, |(_, d)| *d) }
+}
+
+/// No light sinks farther than this, metres.
+fn deepest(clearance: f64, mean: f64, error: f64) -> f64 {
+    let of_mean = DEEPEST_OF_MEAN * (clearance + mean);
+    of_mean.min(DEEPEST_OF_ERROR * error + DEEPEST_OF_CLEARANCE * clearance)
 }
 
 /// The artist's density per face; 0 where a face stands for nothing, or where the offset made it too thin to be a light.

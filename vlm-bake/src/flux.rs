@@ -21,7 +21,7 @@ use crate::topology::area;
 
 /// Lights are scaled by at most this factor, up or down: beyond it, what is left would be a hot spot in place of much that was dropped.
 /// What is cut off is lost, and reported.
-const MOST_SCALING: f64 = 4.0;
+const MOST_SCALING: f64 = 8.0;
 
 /// The reflecting area of a hollow may grow by at most this factor.
 const MOST_GROWTH: f64 = 1.1;

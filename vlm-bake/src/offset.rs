@@ -21,9 +21,10 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use crate::clearance::self_lighting;
-use crate::correspondence::{Correspondence, Light, points_of_lights};
+use crate::correspondence::Light;
 use crate::decimate::LightMesh;
 use crate::ground::Ground;
+use crate::standing::Standing;
 use crate::surface::SurfacePoint;
 use crate::topology::Lists;
 
@@ -45,8 +46,6 @@ const TOLERANCE: f64 = 0.005;
 pub struct Surroundings<'a> {
     /// The visible surface.
     pub ground: &'a Ground<'a>,
-    /// Points on it.
-    pub points: &'a [SurfacePoint],
     /// No vertex moves farther than this, metres; less where its edges are short.
     pub deepest: f64,
 }
@@ -70,54 +69,87 @@ struct Limits {
     objects: Vec<u32>,
 }
 
-/// Moves the vertices of `mesh` from their places of rest. `emits` is false for faces that make no lights. Faces of two-sided
-/// surfaces stay where they are: no place behind hides them, so they are tagged later.
-pub fn offset(mesh: &mut LightMesh, rest: &[DVec3], emits: &[bool], around: &Surroundings) {
-    let mut planes = face_planes(mesh, rest, emits, around);
-    let limits = Limits { deepest: deepest(mesh, rest, around), objects: objects_of(mesh, around) };
-    let mut dirty: Vec<u32> = (0..rest.len() as u32).collect();
-    let mut standing = Lists::default();
-    for round in 0..ROUNDS {
-        settle(mesh, rest, &planes, &dirty, &limits, around);
-        let lights = mesh.lights();
-        if round % 2 == 0 {
-            let correspondence = Correspondence::new(around.ground, &lights, |l| emits[l]);
-            standing = points_of_lights(&correspondence.of(around.points), lights.len());
-        }
-        let found = crossed_planes(mesh, &lights, rest, &standing, around);
-        dirty.clear();
-        for (vertex, plane) in found {
-            let known = &mut planes[vertex as usize];
-            if !known.iter().any(|k| k.triangle == plane.triangle) {
-                known.push(plane);
-                dirty.push(vertex);
-            }
-        }
-        dirty.dedup();
-        if dirty.is_empty() && round % 2 == 0 {
-            break;
-        }
-    }
+/// A mesh in place, and what holds its vertices there. It is kept while the mesh is refined, so that only what was cut is placed anew.
+#[derive(Default)]
+pub struct Offset {
+    /// The mesh in place.
+    pub mesh: LightMesh,
+    emits: Vec<bool>,
+    planes: Vec<Vec<Plane>>,
 }
 
-/// To begin with, each vertex lies below the planes of its faces.
-fn face_planes(mesh: &LightMesh, rest: &[DVec3], emits: &[bool], around: &Surroundings) -> Vec<Vec<Plane>> {
-    let mut planes = vec![Vec::new(); rest.len()];
-    for (f, face) in mesh.faces.iter().enumerate() {
-        if !emits[f] || around.ground.patches.regions[face.region as usize].two_sided {
-            continue;
-        }
-        let corners = face.vertices.map(|v| rest[v as usize]);
-        let normal = crate::topology::cross_of(corners).normalize_or_zero();
-        for v in face.vertices {
-            planes[v as usize].push(Plane {
-                normal,
-                depth: MARGIN * around.ground.clearance,
-                triangle: u32::MAX,
-            });
+impl Offset {
+    /// Moves the vertices of a mesh from their places of `rest`. `emits` is false for faces that make no lights. Faces of two-sided
+    /// surfaces stay where they are: no place behind hides them, so they are tagged later. `standing` follows.
+    pub fn place(
+        &mut self,
+        rest: &LightMesh,
+        emits: &[bool],
+        around: &Surroundings,
+        standing: &mut Standing,
+    ) {
+        let mut dirty = self.take(rest, emits, around);
+        let rest = &rest.positions;
+        let limits =
+            Limits { deepest: deepest(&self.mesh, rest, around), objects: objects_of(&self.mesh, around) };
+        let mut lists = Lists::default();
+        for round in 0..ROUNDS {
+            settle(&mut self.mesh, rest, &self.planes, &dirty, &limits, around);
+            let lights = self.mesh.lights();
+            if round % 2 == 0 {
+                standing.update(around.ground, &lights, emits);
+                lists = standing.lists();
+            }
+            let found = crossed_planes(&self.mesh, &lights, rest, &lists, standing.points, around);
+            dirty.clear();
+            for (vertex, plane) in found {
+                let known = &mut self.planes[vertex as usize];
+                if !known.iter().any(|k| k.triangle == plane.triangle) {
+                    known.push(plane);
+                    dirty.push(vertex);
+                }
+            }
+            dirty.dedup();
+            if dirty.is_empty() && round % 2 == 0 {
+                break;
+            }
         }
     }
-    planes
+
+    /// Takes a mesh over from rest. Vertices of faces that are new start there, below the planes of these faces; the others stay. Returns
+    /// the former, ascending.
+    fn take(&mut self, rest: &LightMesh, emits: &[bool], around: &Surroundings) -> Vec<u32> {
+        let mut fresh = vec![false; rest.positions.len()];
+        for (f, face) in rest.faces.iter().enumerate() {
+            if self.mesh.faces.get(f) != Some(face) || self.emits.get(f) != emits.get(f) {
+                face.vertices.into_iter().for_each(|v| fresh[v as usize] = true);
+            }
+        }
+        self.mesh.faces.clone_from(&rest.faces);
+        self.emits = emits.to_vec();
+        self.planes.resize(rest.positions.len(), Vec::new());
+        self.mesh.positions.extend_from_slice(&rest.positions[self.mesh.positions.len()..]);
+        let fresh: Vec<u32> = (0..fresh.len() as u32).filter(|&v| fresh[v as usize]).collect();
+        for &v in &fresh {
+            self.planes[v as usize].clear();
+        }
+        self.add_face_planes(rest, &fresh, around);
+        fresh
+    }
+
+    /// To begin with, vertices lie below the planes of their faces.
+    fn add_face_planes(&mut self, rest: &LightMesh, vertices: &[u32], around: &Surroundings) {
+        for (f, face) in rest.faces.iter().enumerate() {
+            if !self.emits[f] || around.ground.patches.regions[face.region as usize].two_sided {
+                continue;
+            }
+            let plane =
+                Plane { normal: rest.normal(f), depth: MARGIN * around.ground.clearance, triangle: u32::MAX };
+            for v in face.vertices.into_iter().filter(|v| vertices.binary_search(v).is_ok()) {
+                self.planes[v as usize].push(plane);
+            }
+        }
+    }
 }
 
 /// The planes above which corners of lights lie that light points of these planes, by vertex.
@@ -126,12 +158,14 @@ fn crossed_planes(
     lights: &[Light],
     rest: &[DVec3],
     standing: &Lists,
+    points: &[SurfacePoint],
     around: &Surroundings,
 ) -> Vec<(u32, Plane)> {
     let crossed = |l: usize| {
         let face = mesh.faces[l];
         let two_sided = around.ground.patches.regions[face.region as usize].two_sided;
         let own = if two_sided { &[] } else { standing.of(l) };
+        let own = own.iter().map(|&p| &points[p as usize]);
         planes_of_light(&lights[l], face.vertices, own, rest, around)
     };
     let mut found: Vec<(u32, Plane)> = (0..lights.len()).into_par_iter().flat_map_iter(crossed).collect();
@@ -140,17 +174,17 @@ fn crossed_planes(
     found
 }
 
-fn planes_of_light(
+fn planes_of_light<'a>(
     light: &Light,
     vertices: [u32; 3],
-    own: &[u32],
+    own: impl Iterator<Item = &'a SurfacePoint>,
     rest: &[DVec3],
     around: &Surroundings,
 ) -> Vec<(u32, Plane)> {
     let normal = light.normal();
     let target = MARGIN * around.ground.clearance;
     let mut found = Vec::new();
-    for point in own.iter().map(|&p| &around.points[p as usize]) {
+    for point in own {
         if self_lighting(&light.corners, normal, point.position, point.normal, around.ground.clearance) <= 0.0
         {
             continue;

@@ -57,19 +57,16 @@ pub fn prove(
     baked: &mut [BakedLight],
     options: &BakeOptions,
     ground: &Ground,
-    mut points: Vec<SurfacePoint>,
+    points: Vec<SurfacePoint>,
 ) -> (VlmAsset, Tags, Verification) {
     let patches = ground.patches;
-    let mut round = 0;
-    loop {
-        let mut tags = tag(scene, patches, baked);
-        let asset = assemble(scene, baked, &tags, options);
-        let count = points.len();
-        let mut proof = check(scene, &asset, ground, points);
-        round += 1;
-        if round == PROOFS || proof.untagged().next().is_none() {
-            measure(patches, baked, &triangle_tags(scene, &asset), &proof, &mut tags.reports);
-            return (asset, tags, proof);
+    let mut tags = tag(scene, patches, baked);
+    let mut asset = assemble(scene, baked, &tags, options);
+    let mut proof = check(scene, &asset, ground, points);
+    // Tags move no light: what fails stays the same.
+    for _ in 1..PROOFS {
+        if proof.untagged().next().is_none() {
+            break;
         }
         for finding in proof.untagged() {
             let light = &mut baked[finding.light as usize];
@@ -82,8 +79,10 @@ pub fn prove(
             accused.triangles.sort_unstable();
             accused.triangles.dedup();
         }
-        // Without the samples that the check added.
-        points = std::mem::take(&mut proof.points);
-        points.truncate(count);
+        tags = tag(scene, patches, baked);
+        asset = assemble(scene, baked, &tags, options);
+        proof.honour_tags(scene, &asset, patches);
     }
+    measure(patches, baked, &triangle_tags(scene, &asset), &proof, &mut tags.reports);
+    (asset, tags, proof)
 }

@@ -64,8 +64,9 @@ impl<'a> Evidence<'a> {
     }
 
     /// The surface points of a light.
-    pub fn own_points(&self, light: usize) -> impl Iterator<Item = &'a SurfacePoint> {
-        self.standing.of(light).iter().map(|&p| &self.points[p as usize])
+    #[must_use]
+    pub fn own_points(&self, light: usize) -> Vec<&'a SurfacePoint> {
+        self.standing.of(light).iter().map(|&p| &self.points[p as usize]).collect()
     }
 }
 
@@ -78,16 +79,36 @@ pub fn verify(lights: &[Light], evidence: &Evidence) -> Vec<Violation> {
 /// What is wrong with a light, if anything.
 #[must_use]
 pub fn judge(number: usize, light: &Light, evidence: &Evidence) -> Option<Violation> {
+    let own = evidence.own_points(number);
     let mut violation = Violation { light: number as u32, ..Violation::default() };
-    lit_points(number, light, evidence, &mut violation);
-    lie_before(number, light, evidence, &mut violation);
+    lit_points(light, &own, evidence, &mut violation);
+    lie_before(light, &own, &mut violation);
     if let Some(region) = evidence.region(light).filter(|region| !region.two_sided) {
-        poke_between(number, light, evidence, &mut violation);
+        poke_between(light, &own, evidence, &mut violation);
         poke_beside(light, region.island, evidence, &mut violation);
     }
     violation.triangles.sort_unstable();
     violation.triangles.dedup();
     (violation.points > 0 || violation.pokes_out).then_some(violation)
+}
+
+/// Whether nothing would be wrong with a light of a one-sided surface if it stood for these points: [`judge`] without the reasons.
+#[must_use]
+pub fn hides(light: &Light, own: &[&SurfacePoint], evidence: &Evidence) -> bool {
+    let (normal, ground) = (light.normal(), evidence.ground);
+    let lit = |p: &&SurfacePoint| {
+        self_lighting(&light.corners, normal, p.position, p.normal, ground.clearance) > 0.0
+    };
+    let mut violation = Violation::default();
+    if own.iter().any(lit) {
+        return false;
+    }
+    lie_before(light, own, &mut violation);
+    if let Some(region) = evidence.region(light).filter(|_| !violation.pokes_out) {
+        poke_beside(light, region.island, evidence, &mut violation);
+    }
+    !violation.pokes_out
+        && !own.iter().any(|point| pokes_from(light, point, evidence, &mut Vec::new()).is_some())
 }
 
 impl Violation {
@@ -100,9 +121,9 @@ impl Violation {
 }
 
 /// Looks for points of a light that it lights.
-fn lit_points(number: usize, light: &Light, evidence: &Evidence, violation: &mut Violation) {
+fn lit_points(light: &Light, own: &[&SurfacePoint], evidence: &Evidence, violation: &mut Violation) {
     let normal = light.normal();
-    for point in evidence.own_points(number) {
+    for point in own {
         let depth =
             self_lighting(&light.corners, normal, point.position, point.normal, evidence.ground.clearance);
         if depth > 0.0 {
@@ -135,32 +156,42 @@ fn lit_corners(light: &Light, evidence: &Evidence, triangles: &mut Vec<u32>) {
 }
 
 /// A light may bridge recesses, but not lie before all that it stands for.
-fn lie_before(number: usize, light: &Light, evidence: &Evidence, violation: &mut Violation) {
+fn lie_before(light: &Light, own: &[&SurfacePoint], violation: &mut Violation) {
     let normal = light.normal();
     let height = |point: &SurfacePoint| (point.position - light.corners[0]).dot(normal);
-    let own = || evidence.own_points(number);
-    if own().next().is_some() && own().all(|point| height(point) <= 0.0) {
+    if !own.is_empty() && own.iter().all(|point| height(point) <= 0.0) {
         violation.pokes_out = true;
-        violation.triangles.extend(own().map(|point| point.triangle));
-        for point in own() {
+        violation.triangles.extend(own.iter().map(|point| point.triangle));
+        for point in own {
             violation.note(-height(point), point.position);
         }
     }
 }
 
 /// Looks for surface between a light's points and the light.
-fn poke_between(number: usize, light: &Light, evidence: &Evidence, violation: &mut Violation) {
-    for point in evidence.own_points(number) {
-        let from = point.inner;
-        let corners = light.corners.map(|v| (v - from).as_vec3a());
-        let way = Vec3::from(closest_point(&corners, Vec3A::ZERO)).as_dvec3();
-        // A point behind its light lies in a recess that the light bridges; one beside it says nothing of what is behind itself.
-        let behind = way.dot(-point.normal) > STRAIGHT_COSINE * way.length();
-        if behind && leads_out(point, from, from + way, evidence, &mut violation.triangles) {
+fn poke_between(light: &Light, own: &[&SurfacePoint], evidence: &Evidence, violation: &mut Violation) {
+    for point in own {
+        if let Some(length) = pokes_from(light, point, evidence, &mut violation.triangles) {
             violation.pokes_out = true;
-            violation.note(way.length(), point.position);
+            violation.note(length, point.position);
         }
     }
+}
+
+/// The length of the way from a point to the nearest place of its light, metres, if it leads out; then adds the triangles that must
+/// not be lit.
+fn pokes_from(
+    light: &Light,
+    point: &SurfacePoint,
+    evidence: &Evidence,
+    triangles: &mut Vec<u32>,
+) -> Option<f64> {
+    let from = point.inner;
+    let corners = light.corners.map(|v| (v - from).as_vec3a());
+    let way = Vec3::from(closest_point(&corners, Vec3A::ZERO)).as_dvec3();
+    // A point behind its light lies in a recess that the light bridges; one beside it says nothing of what is behind itself.
+    let behind = way.dot(-point.normal) > STRAIGHT_COSINE * way.length();
+    (behind && leads_out(point, from, from + way, evidence, triangles)).then(|| way.length())
 }
 
 /// True if the way from a surface point to a place behind it leads out on another side; then the triangles on the way, and that

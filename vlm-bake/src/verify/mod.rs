@@ -49,6 +49,8 @@ pub struct Verification {
     pub patches: Patches,
     /// The light that the surface gets from its own lights.
     pub self_light: SelfLight,
+    /// The asset's lights, world space.
+    pub lights: Vec<Light>,
 }
 
 /// What a light does wrong.
@@ -103,6 +105,17 @@ pub struct ClearanceReport {
 }
 
 impl Verification {
+    /// Looks anew at what the tags of the same asset keep dark.
+    pub fn honour_tags(&mut self, scene: &Scene, asset: &VlmAsset, patches: &Patches) {
+        let tags = ReceiverTags::new(scene, asset, patches);
+        for finding in &mut self.findings {
+            finding.tagged = finding.kind != FindingKind::TooThin
+                && finding.triangles.iter().all(|&triangle| tags.ignores(triangle, finding.light));
+        }
+        let ignores = |point: &SurfacePoint, light: u32| tags.ignores(point.triangle, light);
+        self.self_light = self_light(&self.lights, &self.points, &self.light_of_point, ignores);
+    }
+
     /// The lights that fail and that no tag mends.
     pub fn untagged(&self) -> impl Iterator<Item = &Finding> {
         self.findings.iter().filter(|finding| !finding.tagged)
@@ -153,23 +166,17 @@ pub fn check(
     }
     let standing = points_of_lights(&light_of_point, lights.len());
     let evidence = Evidence { ground, points: &points, standing: &standing };
-    let tags = ReceiverTags::new(scene, asset, ground.patches);
-    let find = |l: usize| finding(scene, l, &placed[l], &evidence, &tags);
+    let find = |l: usize| finding(scene, l, &placed[l], &evidence);
     let findings = (0..lights.len()).into_par_iter().filter_map(find).collect();
-    let ignores = |point: &SurfacePoint, light: u32| tags.ignores(point.triangle, light);
-    let self_light = self_light(&lights, &points, &light_of_point, ignores);
     let required_m = ground.clearance;
-    Verification { points, light_of_point, findings, required_m, self_light, patches: Patches::default() }
+    let mut verification =
+        Verification { points, light_of_point, findings, required_m, lights, ..Verification::default() };
+    verification.honour_tags(scene, asset, ground.patches);
+    verification
 }
 
-/// What is wrong with a light of an asset, if anything.
-fn finding(
-    scene: &Scene,
-    number: usize,
-    placed: &Placed,
-    evidence: &Evidence,
-    tags: &ReceiverTags,
-) -> Option<Finding> {
+/// What is wrong with a light of an asset, if anything; whether a tag mends it is not known yet.
+fn finding(scene: &Scene, number: usize, placed: &Placed, evidence: &Evidence) -> Option<Finding> {
     let light = &placed.light;
     let bare = Finding {
         light: number as u32,
@@ -188,8 +195,7 @@ fn finding(
     }
     let Violation { points, depth, place, triangles, .. } = violation;
     let kind = if points > 0 { FindingKind::LightsItself } else { FindingKind::PokesOut };
-    let tagged = triangles.iter().all(|&triangle| tags.ignores(triangle, number as u32));
-    Some(Finding { kind, points, depth_m: depth, place, triangles, tagged, ..bare })
+    Some(Finding { kind, points, depth_m: depth, place, triangles, ..bare })
 }
 
 /// Corners in single precision and a transform may stretch a light by this share.
