@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use glam::Vec3A;
+use rayon::prelude::*;
 use vlm_format::{Grid, VlmAsset};
 
 use crate::authored;
@@ -108,11 +109,11 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
 
     clock.stage("verify");
     let lights = &hidden.lights;
-    let standing = points_of_lights(&hidden.light_of_point, lights.len());
     let violations = std::mem::take(&mut hidden.violations);
 
     clock.stage("samples");
     let accused = accusations(&patches, lights, violations);
+    let spoken_for = spoken_for(&ground, lights, &points, &hidden.light_of_point);
     let sources = Sources {
         scene,
         patches: &patches,
@@ -120,7 +121,7 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
         rest_areas: &hidden.rest_areas,
         accused: &accused,
         points: &points,
-        standing: &standing,
+        standing: &points_of_lights(&spoken_for, lights.len()),
     };
     let mut baked = samples(&sources, lights, options.samples);
     let flux = conserve(scene, &patches, &surfaces, &points, &mut baked);
@@ -214,6 +215,19 @@ fn measured_distance(points: &[SurfacePoint], light_of_point: &[Option<u32>], fa
 fn deepest(clearance: f64, mean: f64, error: f64) -> f64 {
     let of_mean = DEEPEST_OF_MEAN * (clearance + mean);
     of_mean.min(DEEPEST_OF_ERROR * error + DEEPEST_OF_CLEARANCE * clearance)
+}
+
+/// The light of each point, and for points that no light stands for the nearest: its samples speak for them too.
+fn spoken_for(
+    ground: &Ground,
+    lights: &[Light],
+    points: &[SurfacePoint],
+    light_of_point: &[Option<u32>],
+) -> Vec<Option<u32>> {
+    let stands = points_of_lights(light_of_point, lights.len());
+    let search = Correspondence::new(ground, lights, |l| !stands.of(l).is_empty());
+    let light = |(point, light): (&SurfacePoint, &Option<u32>)| light.or_else(|| search.nearest_in_region(point));
+    points.par_iter().zip(light_of_point).map(light).collect()
 }
 
 /// The artist's density per face; 0 where a face stands for nothing, or where the offset made it too thin to be a light.

@@ -108,14 +108,20 @@ impl<'a> Correspondence<'a> {
         along(-point.normal).or_else(|| along(point.normal)).or(Some(near.triangle))
     }
 
+    /// The nearest light of a point's region and side, whichever way it looks: it speaks for surface that no light stands for.
+    #[must_use]
+    pub fn nearest_in_region(&self, point: &SurfacePoint) -> Option<u32> {
+        let own = self.patches.triangle_region[point.triangle as usize];
+        let alike = |l: u32| self.sides[l as usize] == point.back;
+        self.regions.closest(own, point.inner, self.reach, alike).map(|near| near.triangle)
+    }
+
     /// The nearest light of a point's region and side, whichever way it looks, else of all that look its way: for surface that no light stands for.
     #[must_use]
     pub fn nearest_of(&self, point: &SurfacePoint) -> Option<u32> {
-        let own = self.patches.triangle_region[point.triangle as usize];
-        let alike = |l: u32| self.sides[l as usize] == point.back;
-        let own = self.regions.closest(own, point.inner, self.reach, alike);
         let facing = |l: u32| self.normals[l as usize].dot(point.normal) > FACING_COSINE;
-        own.or_else(|| self.all.closest(0, point.inner, self.reach, facing)).map(|near| near.triangle)
+        let any = || Some(self.all.closest(0, point.inner, self.reach, facing)?.triangle);
+        self.nearest_in_region(point).or_else(any)
     }
 
     /// The light of each point.

@@ -92,7 +92,10 @@ pub struct Sources<'a> {
     pub standing: &'a Lists,
 }
 
-/// The finished lights, each with at most `count` samples. Lights without any surface are left out.
+/// A light much larger than the mean has at most this many times as many samples, one much smaller at least one over it.
+const MOST_SAMPLES_SHARE: f64 = 4.0;
+
+/// The finished lights, each with about `count` samples: more where it is larger than the mean, fewer where it is smaller. Lights without any surface are left out.
 #[must_use]
 pub fn samples(sources: &Sources, lights: &[Light], count: u32) -> Vec<BakedLight> {
     // The ratio of areas is the group's: over one light, the number of points fluctuates too much.
@@ -103,10 +106,13 @@ pub fn samples(sources: &Sources, lights: &[Light], count: u32) -> Vec<BakedLigh
         *surface += own.map(|&p| sources.points[p as usize].area).sum::<f64>();
         *made += light.area();
     }
+    let mean_area = lights.iter().map(Light::area).sum::<f64>() / lights.len().max(1) as f64;
     let finish = |(l, light): (usize, &Light)| {
+        let share = (light.area() / mean_area).clamp(1.0 / MOST_SAMPLES_SHARE, MOST_SAMPLES_SHARE);
+        let count = (f64::from(count) * share).ceil() as usize;
         let [surface, made] = areas[&sources.group[l]];
         let ratio = (surface / made).min(MOST_AREA_RATIO) as f32;
-        finish_light(sources, l, light, ratio, count as usize)
+        finish_light(sources, l, light, ratio, count)
     };
     lights.par_iter().enumerate().filter_map(finish).collect()
 }
