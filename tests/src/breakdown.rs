@@ -17,6 +17,7 @@ use vlm_bake::progress::Silent;
 use vlm_bake::render::{LitScene, RenderError, gather_by_grid};
 use vlm_bake::scene::{Camera, Scene};
 use vlm_bake::shade::TraceScene;
+use vlm_shaders::cpu::inject::source_radiosity;
 use vlm_shaders::cpu::resolve::luminance;
 
 use crate::method::View;
@@ -150,19 +151,31 @@ pub fn measure(
 }
 
 /// Path tracing in which surface has the radiosity of its light.
-fn traced_by_lights(trace: &TraceScene, view: &View, baked: &Bake, spp: u32) -> Result<Vec<Vec3>, RenderError> {
+fn traced_by_lights(
+    trace: &TraceScene,
+    view: &View,
+    baked: &Bake,
+    spp: u32,
+) -> Result<Vec<Vec3>, RenderError> {
     let lit = LitScene::new(trace, &baked.asset)?;
+    let grid = baked.asset.grid.clone().unwrap_or_default();
+    let radiosity = source_radiosity(&grid, &lit.lights, &lit.reflected);
     let at = |(pixel, point): (usize, &Option<vlm_bake::shade::SurfacePoint>)| {
         point.as_ref().map_or(Vec3::ZERO, |point| {
             let row = vlm_bake::grid::transport(trace, &baked.stand_ins, point, spp, pixel as u64);
-            row.iter().map(|&(light, share)| lit.radiosity[light as usize] * share).sum()
+            row.iter().map(|&(sample, share)| radiosity[sample as usize] * share).sum()
         })
     };
     Ok(view.gbuffer.points.par_iter().enumerate().map(at).collect())
 }
 
 /// The signed error of luminance over the truth's mean, blue too dark, red too bright.
-fn write_error(path: &Path, (width, height): (u32, u32), picture: &[Vec3], truth: &[Vec3]) -> Result<(), BreakdownError> {
+fn write_error(
+    path: &Path,
+    (width, height): (u32, u32),
+    picture: &[Vec3],
+    truth: &[Vec3],
+) -> Result<(), BreakdownError> {
     let mean = truth.iter().map(|&t| luminance(t)).sum::<f32>() / truth.len().max(1) as f32;
     let colour = |i: usize| false_colour(f64::from((luminance(picture[i]) - luminance(truth[i])) / mean));
     let pixels: Vec<u8> = (0..truth.len()).flat_map(colour).collect();
@@ -179,7 +192,8 @@ pub fn table(rows: &[Row]) -> String {
     );
     for r in rows {
         let lights = r.lights_error.zip(r.lights_energy);
-        let lights = lights.map_or_else(String::new, |(e, energy)| format!("{e:.3}, {:+.1} %", 100.0 * energy));
+        let lights =
+            lights.map_or_else(String::new, |(e, energy)| format!("{e:.3}, {:+.1} %", 100.0 * energy));
         text += &format!(
             "| {} | {} | {} | {} | {} | {:.1} | {:.1} | {:.3} | {lights} | {:.3} | {:+.1} % | {:.1} | {:.2} |\n",
             r.scene,

@@ -30,12 +30,12 @@ pub fn quads(file: &GltfFile) -> VlmAsset {
         push_quad(&mut asset, node.index() as u32);
     }
     tag_surface(&mut asset, file);
-    asset.grid = Some(grid(asset.triangles.len() as u32));
+    asset.grid = Some(grid(asset.triangles.len() as u32, asset.samples.len()));
     asset
 }
 
 /// Two cells of 24, one divided, over a probe on surface and one in free space.
-fn grid(lights: u32) -> Grid {
+fn grid(lights: u32, samples: usize) -> Grid {
     let mut rows = RowWriter::default();
     rows.push((0..lights).map(|light| (light, 200)));
     rows.push((0..lights.min(1)).map(|light| (light, 1)));
@@ -56,14 +56,17 @@ fn grid(lights: u32) -> Grid {
         dimensions: [2, 3, 4],
         cells,
         leaves: vec![
-            Leaf { probes: 0, free_probes: 1, near: 0, padding: 0 },
-            Leaf { probes: 2, free_probes: 3, near: lights.min(1), padding: 0 },
-            Leaf { probes: 3, free_probes: 3, near: lights.min(1), padding: 0 },
+            Leaf { probes: 0, free_probes: 1 },
+            Leaf { probes: 2, free_probes: 3 },
+            Leaf { probes: 3, free_probes: 3 },
         ],
         leaf_probes: vec![0, 1, 0],
-        near: (0..lights.min(1)).map(|light| NearLight { light, visibility: [128, 0, 0, 0] }).collect(),
+        near_starts: vec![0, lights.min(1), lights.min(1)],
+        near: (0..lights.min(1)).map(|light| NearLight::new(light, 128)).collect(),
         probes: vec![probe, Probe { normal: Vec3::Z, tangent: Vec3::X, ..probe }],
         surface_probes: 1,
+        sample_shares: vec![1.0; samples],
+        surface_gains: vec![1.0; lights as usize],
         row_starts: rows.starts,
         rows: rows.words,
     }

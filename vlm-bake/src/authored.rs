@@ -170,6 +170,7 @@ impl AuthoredLights<'_> {
                 position: point.position,
                 normal: point.normal,
                 reflectance: painted.unwrap_or(*albedo) * strength * share,
+                share,
             })
             .collect()
     }

@@ -20,8 +20,8 @@ use crate::options::BakeOptions;
 use crate::patches::{Patches, patches};
 use crate::progress::Progress;
 use crate::prove::{accusations, prove};
-use crate::render::world_lights;
 use crate::refine::{Refiner, Snap};
+use crate::render::world_lights;
 use crate::report::{AreaReport, DecimationReport, GridReport, OffsetReport, Report};
 use crate::samples::{BakedLight, Sources, samples};
 use crate::scene::Scene;
@@ -142,7 +142,7 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
 
     clock.stage("grid");
     let stand_ins = StandIns::new(scene, &ground, &baked);
-    asset.grid = static_grid(scene, &asset, &stand_ins, &options.grid, progress);
+    asset.grid = static_grid(scene, &asset, &baked, &stand_ins, &options.grid, progress);
     asset.settings.cell_size = asset.grid.as_ref().map_or(0.0, |grid| grid.cell_size);
 
     let mut report = Report {
@@ -170,13 +170,17 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
 fn static_grid(
     scene: &Scene,
     asset: &VlmAsset,
+    baked: &[BakedLight],
     stand_ins: &StandIns,
     options: &GridOptions,
     progress: &dyn Progress,
 ) -> Option<Grid> {
     let lights = world_lights(scene, asset).ok()?;
     let trace = TraceScene::new(scene);
-    grid(&GridInput { trace: &trace, stand_ins, lights: &lights }, options, progress)
+    let gains: Vec<f32> = baked.iter().map(BakedLight::surface_gain).collect();
+    let shares: Vec<f32> = baked.iter().flat_map(|l| &l.samples).map(|s| s.share).collect();
+    let input = GridInput { trace: &trace, stand_ins, lights: &lights, gains: &gains, shares: &shares };
+    grid(&input, options, progress)
 }
 
 fn authored_lights(lights: &[BakedLight]) -> usize {
@@ -226,7 +230,8 @@ fn spoken_for(
 ) -> Vec<Option<u32>> {
     let stands = points_of_lights(light_of_point, lights.len());
     let search = Correspondence::new(ground, lights, |l| !stands.of(l).is_empty());
-    let light = |(point, light): (&SurfacePoint, &Option<u32>)| light.or_else(|| search.nearest_in_region(point));
+    let light =
+        |(point, light): (&SurfacePoint, &Option<u32>)| light.or_else(|| search.nearest_in_region(point));
     points.par_iter().zip(light_of_point).map(light).collect()
 }
 

@@ -9,8 +9,8 @@ use vlm_format::{Grid, VlmAsset};
 use vlm_shaders::cpu::gather::{Gathered, Receiver, gather_together};
 use vlm_shaders::cpu::gather_static::Frame;
 use vlm_shaders::cpu::grid::leaf_at;
-use vlm_shaders::cpu::inject::inject;
-use vlm_shaders::cpu::refresh::{FarSource, refresh};
+use vlm_shaders::cpu::inject::{radiosity, reflect, source_radiosity};
+use vlm_shaders::cpu::refresh::{far_sources, refresh};
 use vlm_shaders::cpu::upload::LightSet;
 
 use crate::gbuffer::GBuffer;
@@ -229,6 +229,8 @@ pub fn gather_by_grid(
 pub struct LitScene {
     /// The lights in world space.
     pub lights: LightSet,
+    /// What each sample adds to its light's radiosity, lx.
+    pub reflected: Vec<Vec3>,
     /// Phase 1's result: radiosity of each light, lx.
     pub radiosity: Vec<Vec3>,
     /// Wall time of phase 1.
@@ -245,10 +247,12 @@ impl LitScene {
     pub fn new(trace: &TraceScene<'_>, asset: &VlmAsset) -> Result<Self, RenderError> {
         let lights = world_lights(trace.scene, asset)?;
         let start = Instant::now();
-        let radiosity = inject(&lights, |position, normal| trace.direct_irradiance(position, normal, normal));
+        let reflected =
+            reflect(&lights, |position, normal| trace.direct_irradiance(position, normal, normal));
+        let radiosity = radiosity(&lights, &reflected);
         let inject_seconds = start.elapsed().as_secs_f64();
         let triangle_tags = triangle_tags(trace.scene, asset);
-        Ok(Self { lights, radiosity, inject_seconds, triangle_tags })
+        Ok(Self { lights, reflected, radiosity, inject_seconds, triangle_tags })
     }
 
     /// Phase 2 at every pixel by `gather`: indirect irradiance in lx, and what it took.
@@ -317,8 +321,8 @@ impl LitScene {
         progress: &dyn Progress,
     ) -> (Vec<Vec3>, RenderStats) {
         let start = Instant::now();
-        let sources: Vec<FarSource> = self.lights.geometry.iter().map(FarSource::new).collect();
-        let far = refresh(grid, &sources, &self.radiosity);
+        let radiosity = source_radiosity(grid, &self.lights, &self.reflected);
+        let far = refresh(grid, &far_sources(&self.lights), &radiosity);
         let frame = Frame { grid, lights: &self.lights, radiosity: &self.radiosity, far: &far };
         let with_leaf = |(pixel, point): (usize, &Option<SurfacePoint>)| {
             let point = point.as_ref()?;
@@ -326,7 +330,8 @@ impl LitScene {
         };
         let mut all: Vec<_> = gbuffer.points.par_iter().enumerate().filter_map(with_leaf).collect();
         all.par_sort_unstable_by_key(|&(leaf, pixel, _)| (leaf, pixel));
-        let tasks: Vec<_> = all.chunk_by(|(a, ..), (b, ..)| a == b).flat_map(|p| p.chunks(PIXELS_TOGETHER)).collect();
+        let tasks: Vec<_> =
+            all.chunk_by(|(a, ..), (b, ..)| a == b).flat_map(|p| p.chunks(PIXELS_TOGETHER)).collect();
         progress.begin("gather", tasks.len() as u64);
         let gather = |pixels: &&[(u32, usize, Receiver)]| {
             progress.advance(1);

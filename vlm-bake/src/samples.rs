@@ -53,6 +53,14 @@ pub struct BakedLight {
     pub samples: Vec<WorldSample>,
 }
 
+impl BakedLight {
+    /// Radiosity of its surface over its own; 1 for authored ones, which are their own surface.
+    #[must_use]
+    pub fn surface_gain(&self) -> f32 {
+        if self.concentration > 0.0 { 1.0 / self.concentration } else { 1.0 }
+    }
+}
+
 /// A sample in world space.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WorldSample {
@@ -62,6 +70,8 @@ pub struct WorldSample {
     pub normal: DVec3,
     /// See [`vlm_format::Sample::reflectance`].
     pub reflectance: Vec3,
+    /// The share of its light's area that it speaks for.
+    pub share: f32,
 }
 
 /// A surface point with its colours.
@@ -172,21 +182,29 @@ fn colour(mut light: BakedLight, candidates: &[Candidate], ratio: f32, count: us
     let chosen = spread(if behind.is_empty() { candidates } else { &behind }, count);
     light.samples = chosen
         .iter()
-        .map(|c| WorldSample { position: c.position, normal: c.point.normal, reflectance: Vec3::ZERO })
+        .map(|c| WorldSample {
+            position: c.position,
+            normal: c.point.normal,
+            reflectance: Vec3::ZERO,
+            share: 0.0,
+        })
         .collect();
     for candidate in candidates {
         let away = |s: &WorldSample| s.position.distance_squared(candidate.position);
         if let Some(nearest) = light.samples.iter_mut().min_by(|a, b| away(a).total_cmp(&away(b))) {
             nearest.reflectance += candidate.albedo * (share(candidate) * ratio);
+            nearest.share += share(candidate);
         }
     }
     // One stays even where all are black: it tells what the light stands for.
     let reflects = light.samples.iter().any(|s| s.reflectance != Vec3::ZERO);
     if reflects {
-        light.samples.retain(|s| s.reflectance != Vec3::ZERO);
+        light.samples.retain(|s| s.reflectance != Vec3::ZERO && s.share > 0.0);
     } else {
         light.samples.truncate(1);
     }
+    let shares: f32 = light.samples.iter().map(|s| s.share).sum();
+    light.samples.iter_mut().for_each(|s| s.share = if shares > 0.0 { s.share / shares } else { 1.0 });
     light
 }
 

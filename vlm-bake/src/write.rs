@@ -21,12 +21,7 @@ pub fn order(lights: &mut [BakedLight]) {
 
 /// Collects ordered lights and tags into an asset without a grid. Lights of an object whose transform has no inverse are left out.
 #[must_use]
-pub fn assemble(
-    scene: &Scene,
-    lights: &[BakedLight],
-    tags: &Tags,
-    options: &BakeOptions,
-) -> VlmAsset {
+pub fn assemble(scene: &Scene, lights: &[BakedLight], tags: &Tags, options: &BakeOptions) -> VlmAsset {
     let (primitive_tags, triangle_tags) = tags.of_primitives(scene);
     let mut asset = VlmAsset {
         generator: GENERATOR.to_owned(),

@@ -2,17 +2,17 @@
 
 use glam::Vec3;
 
-/// The most probes that a cell lists: as many as a near light has bytes of visibility.
-pub const MOST_PROBES: usize = 16;
+/// The most probes on surface that a leaf lists.
+pub const MOST_PROBES: usize = 32;
 
-/// Visibility 1 in a byte of [`NearLight::visibility`]; up to 255 may stand for a light that seems larger than it is.
+/// Visibility 1 of a [`NearLight`]; up to 255 may stand for a light that seems larger than it is.
 pub const FULL_VISIBILITY: f32 = 128.0;
 
 /// Transport from lights to probes on the visible surface and in free space, and a tree of cells that tells which of them a point
 /// looks at. World space.
 ///
-/// A point's irradiance is the blend of its probes' far light plus the form factors of its cell's near lights, each times the
-/// blend of their visibility at the probes. See [`Probe`] for the weights of the blend.
+/// A point's irradiance is the blend of its probes' far light plus the form factors of their near lights, each times the
+/// blend of its visibility at the probes. See [`Probe`] for the weights of the blend.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Grid {
     /// Minimum corner, metres.
@@ -28,17 +28,26 @@ pub struct Grid {
     pub leaves: Vec<Leaf>,
     /// Numbers of probes, for each leaf those on surface, then those in free space, ascending.
     pub leaf_probes: Vec<u32>,
-    /// For each leaf the lights that are evaluated exactly there, ascending.
+    /// `probes.len() + 1` offsets: the lights that points around probe `i` evaluate exactly are `near[near_starts[i]..near_starts[i + 1]]`.
+    pub near_starts: Vec<u32>,
+    /// Ascending for each probe.
     pub near: Vec<NearLight>,
     /// Probes on surface, then those in free space.
     pub probes: Vec<Probe>,
     /// Number of probes on surface.
     pub surface_probes: u32,
+    /// The share of its light's area that each sample speaks for, above 0.
+    pub sample_shares: Vec<f32>,
+    /// Radiosity of the surface that each light stands for over the light's own.
+    pub surface_gains: Vec<f32>,
     /// `probes.len() + 1` offsets in entries: the far light of probe `i` is that of the entries `row_starts[i]..row_starts[i + 1]`.
     pub row_starts: Vec<u32>,
-    /// Two entries to a word, the first in its lower half: weight times 256 plus step. A step counts from the light of the entry before
+    /// Two entries to a word, the first in its lower half: weight times 256 plus step. A step counts from the source of the entry before
     /// (0 at a row's beginning); an entry of weight 0 takes 256 of its steps and nothing else. Irradiance per radiosity is the
     /// weight times [`Probe::row_scale`].
+    ///
+    /// Sources are patches of surface: those of the samples, in their order, then those of whole lights. A sample's radiosity is
+    /// `gain (reflectance E / share + emission)`, the light's the sum of `share` times that over its samples.
     pub rows: Vec<u32>,
 }
 
@@ -50,21 +59,32 @@ pub struct Leaf {
     pub probes: u32,
     /// Likewise: probes in free space.
     pub free_probes: u32,
-    /// Index into [`Grid::near`].
-    pub near: u32,
-    /// 0.
-    pub padding: u32,
 }
 
-/// A light that the points of a leaf evaluate exactly.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct NearLight {
+/// A light whose form factor points around a probe evaluate exactly, and the share of it that the probe sees: the light's number times
+/// 256, plus the visibility times 128.
+#[repr(transparent)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct NearLight(pub u32);
+
+impl NearLight {
+    /// Of a light below 2^24 and a visibility in units of 1 / [`FULL_VISIBILITY`].
+    #[must_use]
+    pub fn new(light: u32, visibility: u8) -> Self {
+        Self((light << 8) | u32::from(visibility))
+    }
+
     /// Number of the light.
-    pub light: u32,
-    /// A byte for each of the leaf's probes on surface, in their order, the first in the lowest: what share of the light's form factor
-    /// the probe sees, times 128. 0 where the light is in the probe's row instead.
-    pub visibility: [u32; 4],
+    #[must_use]
+    pub fn light(self) -> u32 {
+        self.0 >> 8
+    }
+
+    /// The share of the light's form factor that the probe sees.
+    #[must_use]
+    pub fn visibility(self) -> f32 {
+        (self.0 & 0xff) as f32 / FULL_VISIBILITY
+    }
 }
 
 /// A place where the light's way is known. 64 bytes.
@@ -136,7 +156,7 @@ impl Probe {
     }
 }
 
-/// The lights and weights (without [`Probe::row_scale`]) of a row.
+/// The sources and weights (without [`Probe::row_scale`]) of a row.
 #[derive(Clone, Debug)]
 pub struct Row<'a> {
     words: &'a [u32],
@@ -150,10 +170,18 @@ impl Grid {
     #[must_use]
     pub fn byte_len(&self) -> usize {
         let words = self.cells.len() + self.leaf_probes.len() + self.row_starts.len() + self.rows.len();
+        let words = words + self.sample_shares.len() + self.surface_gains.len() + self.near_starts.len();
         size_of_val(&*self.leaves)
             + size_of_val(&*self.near)
             + size_of_val(&*self.probes)
             + size_of::<u32>() * words
+    }
+
+    /// The near lights of a probe; empty where indices are out of range.
+    #[must_use]
+    pub fn near_of(&self, probe: usize) -> &[NearLight] {
+        let range = self.near_starts.get(probe).zip(self.near_starts.get(probe + 1));
+        range.and_then(|(&from, &to)| self.near.get(from as usize..to as usize)).unwrap_or(&[])
     }
 
     /// The far light of a probe; empty where indices are out of range.

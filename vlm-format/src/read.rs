@@ -148,9 +148,14 @@ impl<'a> Reader<'a> {
             cells: self.integers("grid", "cells"),
             leaves: self.records("leaves"),
             leaf_probes: self.integers("grid", "leafProbes"),
+            near_starts: self.integers("grid", "nearStarts"),
             near: self.records("near"),
             probes: self.probes(),
-            surface_probes: count(json, "surfaceProbes").and_then(|n| u32::try_from(n).ok()).unwrap_or(u32::MAX),
+            surface_probes: count(json, "surfaceProbes")
+                .and_then(|n| u32::try_from(n).ok())
+                .unwrap_or(u32::MAX),
+            sample_shares: self.scalars("sampleShares"),
+            surface_gains: self.scalars("surfaceGains"),
             row_starts: self.integers("grid", "rowStarts"),
             rows: self.integers("grid", "rows"),
         }
@@ -159,6 +164,15 @@ impl<'a> Reader<'a> {
     /// Structs of unsigned integers; a torn one at the end is left out.
     fn records<T: bytemuck::Pod>(&mut self, key: &str) -> Vec<T> {
         from_words(&self.integers("grid", key))
+    }
+
+    fn scalars(&mut self, key: &str) -> Vec<f32> {
+        let read = |file: &GltfFile, accessor| {
+            let values = file.read_floats(accessor)?;
+            let bytes = values.iter().copied().flat_map(f32::to_le_bytes).collect();
+            Ok((values, bytes))
+        };
+        self.elements(&self.place("grid", key), "SCALAR", read)
     }
 
     fn probes(&mut self) -> Vec<Probe> {

@@ -120,9 +120,17 @@ impl Arrays {
         self.integers(&mut json, "cells", &grid.cells);
         self.integers(&mut json, "leaves", bytemuck::cast_slice(&grid.leaves));
         self.integers(&mut json, "leafProbes", &grid.leaf_probes);
+        self.integers(&mut json, "nearStarts", &grid.near_starts);
         self.integers(&mut json, "near", bytemuck::cast_slice(&grid.near));
-        let probes: Vec<u8> = grid.probes.iter().flat_map(|p| bytemuck::cast::<_, [f32; 16]>(*p)).flat_map(f32::to_le_bytes).collect();
+        let probes: Vec<u8> = grid
+            .probes
+            .iter()
+            .flat_map(|p| bytemuck::cast::<_, [f32; 16]>(*p))
+            .flat_map(f32::to_le_bytes)
+            .collect();
         self.push(&mut json, "probes", "VEC4", 5126, 4 * grid.probes.len(), &probes);
+        self.scalars(&mut json, "sampleShares", &grid.sample_shares);
+        self.scalars(&mut json, "surfaceGains", &grid.surface_gains);
         self.integers(&mut json, "rowStarts", &grid.row_starts);
         self.integers(&mut json, "rows", &grid.rows);
         Value::Object(json)
@@ -138,6 +146,11 @@ impl Arrays {
         let bytes: Vec<u8> =
             values.iter().flat_map(|value| value.to_array()).flat_map(f32::to_le_bytes).collect();
         self.push(json, key, "VEC3", 5126, values.len(), &bytes);
+    }
+
+    fn scalars(&mut self, json: &mut Map<String, Value>, key: &str, values: &[f32]) {
+        let bytes: Vec<u8> = values.iter().copied().flat_map(f32::to_le_bytes).collect();
+        self.push(json, key, "SCALAR", 5126, values.len(), &bytes);
     }
 
     fn integers(&mut self, json: &mut Map<String, Value>, key: &str, values: &[u32]) {

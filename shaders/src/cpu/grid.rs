@@ -8,8 +8,9 @@ use super::gather::Receiver;
 /// The most levels below the coarsest: bounds the descent, whatever a file holds.
 const DEEPEST: u32 = 24;
 
-/// What a probe counts outside its reach: nothing, but where no other reaches either. Higher values leak, lower ones underflow.
-const STRAY: f32 = 1e-6;
+/// Weights of probes that sum to this leave nothing to probes that do not reach the point. Higher values leak more at the ends of
+/// reaches, lower ones make them sharper.
+const FIRM: f32 = 1e-3;
 
 /// The leaf that holds `x`; `None` outside the grid and where nothing is stored.
 #[must_use]
@@ -63,18 +64,25 @@ pub fn blend(grid: &Grid, leaf: u32, receiver: &Receiver) -> Blend {
     let Some(lists) = grid.leaves.get(leaf as usize) else { return blend };
     blend.first = lists.probes;
     blend.count = (lists.free_probes - lists.probes).min(MOST_PROBES as u32);
-    let mut sum = 0.0;
+    let mut strays = [0.0; MOST_PROBES];
+    let (mut sum, mut stray_sum) = (0.0, 0.0);
     for i in 0..blend.count {
         let probe = grid.leaf_probes.get((blend.first + i) as usize);
         let Some(probe) = probe.and_then(|&probe| grid.probes.get(probe as usize)) else { continue };
         let local = probe.local(receiver.position);
-        let inside = probe.normal_weight(receiver.normal) * probe.place_weight(local);
-        let weight = inside + STRAY * probe.stray_weight(local, receiver.normal);
-        blend.weights[i as usize] = weight;
+        let weight = probe.normal_weight(receiver.normal) * probe.place_weight(local);
+        let stray = probe.stray_weight(local, receiver.normal);
+        (blend.weights[i as usize], strays[i as usize]) = (weight, stray);
         sum += weight;
+        stray_sum += stray;
     }
-    if sum > 0.0 {
-        blend.weights.iter_mut().for_each(|weight| *weight /= sum);
+    // Where reaches end, strays fade in.
+    let stray_share = (1.0 - sum / FIRM).max(0.0);
+    let stray_share = stray_share * stray_share;
+    let inside = if sum > 0.0 { (1.0 - stray_share) / sum } else { 0.0 };
+    let outside = if stray_sum > 0.0 { (if sum > 0.0 { stray_share } else { 1.0 }) / stray_sum } else { 0.0 };
+    for (weight, stray) in blend.weights.iter_mut().zip(strays) {
+        *weight = *weight * inside + stray * outside;
     }
     blend
 }

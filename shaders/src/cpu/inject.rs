@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
+use vlm_format::Grid;
 
 use super::upload::LightSet;
 
@@ -11,12 +12,44 @@ use super::upload::LightSet;
 /// space.
 #[must_use]
 pub fn inject(lights: &LightSet, irradiance: impl Fn(Vec3, Vec3) -> Vec3 + Sync) -> Vec<Vec3> {
+    radiosity(lights, &reflect(lights, irradiance))
+}
+
+/// What each sample adds to its light's radiosity, lx: `reflectance * E`.
+#[must_use]
+pub fn reflect(lights: &LightSet, irradiance: impl Fn(Vec3, Vec3) -> Vec3 + Sync) -> Vec<Vec3> {
+    lights.samples.par_iter().map(|s| s.reflectance * irradiance(s.position, s.normal)).collect()
+}
+
+/// The radiosity of each light from what its samples reflect, one per sample.
+#[must_use]
+pub fn radiosity(lights: &LightSet, reflected: &[Vec3]) -> Vec<Vec3> {
     let radiosity = |light: usize| {
-        let samples = lights.samples_of(light).iter();
-        let reflected: Vec3 = samples.map(|s| s.reflectance * irradiance(s.position, s.normal)).sum();
-        lights.emission.get(light).copied().unwrap_or_default() + reflected
+        let own = lights.sample_range(light).and_then(|range| reflected.get(range)).unwrap_or(&[]);
+        lights.emission.get(light).copied().unwrap_or_default() + own.iter().sum::<Vec3>()
     };
     (0..lights.len()).into_par_iter().map(radiosity).collect()
+}
+
+/// The radiosity of the grid's sources, lx: of the surface around each sample, then of the surface of each light.
+#[must_use]
+pub fn source_radiosity(grid: &Grid, lights: &LightSet, reflected: &[Vec3]) -> Vec<Vec3> {
+    let mut sources = vec![Vec3::ZERO; lights.samples.len() + lights.len()];
+    let (of_samples, of_lights) = sources.split_at_mut(lights.samples.len());
+    for (light, of_light) in of_lights.iter_mut().enumerate() {
+        let Some(range) = lights.sample_range(light) else { continue };
+        let gain = grid.surface_gains.get(light).copied().unwrap_or(0.0);
+        let emission = lights.emission.get(light).copied().unwrap_or_default();
+        for sample in range {
+            let share = grid.sample_shares.get(sample).copied().unwrap_or(1.0);
+            let own = (reflected.get(sample).copied().unwrap_or_default() / share + emission) * gain;
+            *of_light += own * share;
+            if let Some(of_sample) = of_samples.get_mut(sample) {
+                *of_sample = own;
+            }
+        }
+    }
+    sources
 }
 
 #[cfg(test)]

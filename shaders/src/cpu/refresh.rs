@@ -2,19 +2,20 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
-use vlm_format::{Grid, Probe};
+use vlm_format::{Grid, Probe, Sample};
 
 use super::form_factor::LightGeometry;
+use super::upload::LightSet;
 
 /// The least cosine to the normal by which a light's direction is used: lower values follow normals that lean toward grazing light
 /// more closely, and make its noise count more.
 const LEAST_COSINE: f32 = 0.2;
 
-/// A light as probes see it from afar.
+/// A source as probes see it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct FarSource {
-    /// Middle of the light, metres.
+    /// Its middle, metres.
     pub centroid: Vec3,
     /// Not used.
     pub padding: f32,
@@ -24,13 +25,16 @@ pub struct FarSource {
     pub padding_2: f32,
 }
 
-impl FarSource {
-    /// Of a light.
-    #[must_use]
-    pub fn new(light: &LightGeometry) -> Self {
+/// All sources of a grid: of the samples, then of the lights.
+#[must_use]
+pub fn far_sources(lights: &LightSet) -> Vec<FarSource> {
+    let of_sample = |s: &Sample| FarSource { centroid: s.position, normal: s.normal, ..FarSource::default() };
+    let of_light = |light: &LightGeometry| {
         let [a, b, c] = light.corners();
-        Self { centroid: (a + b + c) / 3.0, normal: light.normal.normalize_or_zero(), ..Self::default() }
-    }
+        let centroid = (a + b + c) / 3.0;
+        FarSource { centroid, normal: light.normal.normalize_or_zero(), ..FarSource::default() }
+    };
+    lights.samples.iter().map(of_sample).chain(lights.geometry.iter().map(of_light)).collect()
 }
 
 /// The far light at a probe on surface: `E(n, u, v) = x n.x + y n.y + z n.z + along_u u + along_v v`.
@@ -55,7 +59,7 @@ impl FarLight {
     }
 }
 
-/// The far light of every probe on surface.
+/// The far light of every probe on surface; `radiosity` is that of the sources.
 #[must_use]
 pub fn refresh(grid: &Grid, sources: &[FarSource], radiosity: &[Vec3]) -> Vec<FarLight> {
     let count = grid.surface_probes as usize;

@@ -58,8 +58,14 @@ impl LightSet {
     /// The samples of one light; none for a number out of range.
     #[must_use]
     pub fn samples_of(&self, light: usize) -> &[Sample] {
+        self.sample_range(light).and_then(|range| self.samples.get(range)).unwrap_or(&[])
+    }
+
+    /// The numbers of the samples of one light.
+    #[must_use]
+    pub fn sample_range(&self, light: usize) -> Option<std::ops::Range<usize>> {
         let range = self.sample_starts.get(light).zip(self.sample_starts.get(light + 1));
-        range.and_then(|(&start, &end)| self.samples.get(start as usize..end as usize)).unwrap_or(&[])
+        range.map(|(&start, &end)| start as usize..end as usize)
     }
 
     fn transform(&mut self, asset: &VlmAsset, vlm: &Vlm, world_from_node: DMat4) {

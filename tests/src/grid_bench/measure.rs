@@ -7,8 +7,8 @@ use vlm_bake::scene::Scene;
 
 use super::GridBenchError;
 use super::lights::{Lights, lights, load_scene};
-use super::scatter::light_lists;
 use super::row::{OURS, Row, THESIS};
+use super::scatter::light_lists;
 use crate::device::processor;
 use crate::random;
 use crate::thesis::{ThesisGrid, ThesisOptions};

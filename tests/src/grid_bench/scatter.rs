@@ -77,7 +77,12 @@ impl Lattice {
 
 /// Builds the grid over lights with these world-space corners; `None` without lights.
 #[must_use]
-pub fn light_lists(scene: &Scene, lights: &[[DVec3; 3]], cell_size: Option<f32>, range: f32) -> Option<LightLists> {
+pub fn light_lists(
+    scene: &Scene,
+    lights: &[[DVec3; 3]],
+    cell_size: Option<f32>,
+    range: f32,
+) -> Option<LightLists> {
     if lights.is_empty() {
         return None;
     }
@@ -143,4 +148,3 @@ fn reached_cells(corners: [DVec3; 3], lattice: &Lattice, cells: &[u32], range: f
         .filter_map(|cell| cells.binary_search(&lattice.number(cell)).ok().map(|i| i as u32))
         .collect()
 }
-

@@ -20,7 +20,7 @@ pub use stand_in::StandIns;
 pub use transport::transport;
 
 use glam::{DVec3, Vec3};
-use vlm_format::{Grid, Probe, RowWriter};
+use vlm_format::{Grid, NearLight, Probe, RowWriter};
 use vlm_shaders::cpu::upload::LightSet;
 
 use crate::progress::Progress;
@@ -51,6 +51,10 @@ pub struct GridInput<'a> {
     pub stand_ins: &'a StandIns,
     /// The lights in world space.
     pub lights: &'a LightSet,
+    /// Radiosity of the surface that each light stands for over the light's own.
+    pub gains: &'a [f32],
+    /// The share of its light's area that each sample speaks for.
+    pub shares: &'a [f32],
 }
 
 /// Builds the grid; `None` without lights or without surface.
@@ -65,9 +69,8 @@ pub fn grid(input: &GridInput, options: &GridOptions, progress: &dyn Progress) -
     let mut chosen = spacing.spread(&pool, 0..pool.len() as u32, 1.0);
     let mut probes = reach::probes(input.trace, &pool, &spacing, &chosen);
     for share in COVERING {
-        let cells = tree::Tree::new(input.trace.scene, bounds, &probes, options.cell_size);
-        let missed = tree::uncovered(&cells.grid, &pool);
-        if std::env::var("DBG").is_ok() { eprintln!("missed {} of {} probes {}", missed.len(), pool.len(), probes.len()); }
+        let cells = tree::tree(input.trace.scene, bounds, &probes, options.cell_size);
+        let missed = tree::uncovered(&cells, &pool);
         let more = spacing.spread(&pool, missed, share);
         probes.extend(reach::probes(input.trace, &pool, &spacing, &more));
         chosen.extend(more);
@@ -75,10 +78,12 @@ pub fn grid(input: &GridInput, options: &GridOptions, progress: &dyn Progress) -
     let places: Vec<_> = chosen.iter().map(|&i| pool[i as usize]).collect();
     progress.begin("transport", places.len() as u64);
     let rows = transport::rows(input, &places, options.rays, progress);
-    let (near, far) = near::split(input.lights, &places, &probes, rows, options);
-    let mut cells = tree::Tree::new(input.trace.scene, bounds, &probes, options.cell_size);
-    cells.add_near(&near);
-    Some(encode(cells.grid, probes, &far))
+    let (near, far) = near::split(input, &places, &probes, rows, options);
+    let cells = tree::tree(input.trace.scene, bounds, &probes, options.cell_size);
+    let mut grid = encode(cells, probes, &near, &far);
+    grid.sample_shares = input.shares.to_vec();
+    grid.surface_gains = input.gains.to_vec();
+    Some(grid)
 }
 
 /// Surface that no probe reaches, behind walls, steps and edges, gets probes of its own in as many rounds, at these shares of their
@@ -86,7 +91,7 @@ pub fn grid(input: &GridInput, options: &GridOptions, progress: &dyn Progress) -
 const COVERING: [f32; 3] = [0.9, 0.6, 0.4];
 
 /// Packs the rows into the grid. Rounding is carried along a row, so that its sum stays.
-fn encode(mut grid: Grid, mut probes: Vec<Probe>, far: &[Vec<(u32, f32)>]) -> Grid {
+fn encode(mut grid: Grid, mut probes: Vec<Probe>, near: &[Vec<NearLight>], far: &[Vec<(u32, f32)>]) -> Grid {
     let mut rows = RowWriter::default();
     for (probe, row) in probes.iter_mut().zip(far) {
         let largest = row.iter().map(|(_, weight)| *weight).fold(0.0, f32::max);
@@ -101,6 +106,13 @@ fn encode(mut grid: Grid, mut probes: Vec<Probe>, far: &[Vec<(u32, f32)>]) -> Gr
     }
     grid.surface_probes = probes.len() as u32;
     grid.probes = probes;
+    grid.near_starts = std::iter::once(0)
+        .chain(near.iter().scan(0, |end, list| {
+            *end += list.len() as u32;
+            Some(*end)
+        }))
+        .collect();
+    grid.near = near.concat();
     grid.row_starts = rows.starts;
     grid.rows = rows.words;
     grid

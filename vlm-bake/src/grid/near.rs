@@ -1,65 +1,107 @@
 //! Which lights a probe leaves to the pixels around it, and how much of them it sees.
 
 use rayon::prelude::*;
-use vlm_format::{FULL_VISIBILITY, Probe};
+use vlm_format::{FULL_VISIBILITY, NearLight, Probe};
 use vlm_shaders::cpu::form_factor::{form_factor, is_behind};
 use vlm_shaders::cpu::upload::LightSet;
 
-use super::GridOptions;
 use super::pool::Place;
-use super::transport::Row;
+use super::transport::{Row, light_of_sample};
+use super::{GridInput, GridOptions};
 
 /// A light is near where its form factor may change over the probe's reach by more than this share of all that the probe gets. Lower values make
 /// more lights near.
 const LEAST_CHANGE: f32 = 2e-3;
 
-/// Near lights of a probe with their visibility in units of [`FULL_VISIBILITY`], ascending by light.
-pub type NearRow = Vec<(u32, u8)>;
+/// Near lights of a probe, ascending by light.
+pub type NearRow = Vec<NearLight>;
 
 /// Splits each row into near lights and the rest.
 #[must_use]
 pub fn split(
-    lights: &LightSet,
+    input: &GridInput,
     places: &[Place],
     probes: &[Probe],
     rows: Vec<Row>,
     options: &GridOptions,
 ) -> (Vec<NearRow>, Vec<Row>) {
-    let parts = rows.into_par_iter().enumerate().map(|(i, row)| {
-        split_row(lights, &places[i], &probes[i], row, options.near as usize)
-    });
-    parts.unzip()
+    let light_of_sample = light_of_sample(input.lights);
+    let splitter = Splitter { lights: input.lights, gains: input.gains, light_of_sample: &light_of_sample };
+    let part = |(i, row)| splitter.split(&places[i], &probes[i], row, options.near as usize);
+    rows.into_par_iter().enumerate().map(part).unzip()
 }
 
-fn split_row(lights: &LightSet, place: &Place, probe: &Probe, row: Row, most: usize) -> (NearRow, Row) {
-    let all: f32 = row.iter().map(|(_, share)| share).sum();
-    let mut changing: Vec<(f32, usize, f32)> = Vec::new();
-    for (i, &(light, share)) in row.iter().enumerate() {
-        if lights.tags[light as usize] != 0 {
-            continue;
+struct Splitter<'a> {
+    lights: &'a LightSet,
+    /// Radiosity of each light's surface over its own.
+    gains: &'a [f32],
+    light_of_sample: &'a [u32],
+}
+
+/// A light of a row that may become near.
+struct Candidate {
+    /// By how much the probe's light may change over its reach.
+    change: f32,
+    light: u32,
+    /// Irradiance per radiosity of its surface, as the row has it.
+    share: f32,
+    form_factor: f32,
+}
+
+impl Splitter<'_> {
+    fn split(&self, place: &Place, probe: &Probe, mut row: Row, most: usize) -> (NearRow, Row) {
+        let mut near: NearRow = Vec::new();
+        let mut kept: Vec<(u32, f32)> = Vec::new();
+        for candidate in self.candidates(place, probe, &row, most) {
+            let exact = candidate.form_factor / self.gains[candidate.light as usize];
+            // What a byte cannot hold stays far, so that both together are the whole.
+            let visibility = (candidate.share / exact * FULL_VISIBILITY).round().clamp(0.0, 255.0);
+            if visibility > 0.0 {
+                near.push(NearLight::new(candidate.light, visibility as u8));
+                kept.push((
+                    candidate.light,
+                    (1.0 - exact * visibility / FULL_VISIBILITY / candidate.share).max(0.0),
+                ));
+            }
         }
-        let Some(form_factor) = seen(lights, place, light) else { continue };
-        let change = share * change(lights, probe, light);
-        if change > LEAST_CHANGE * all {
-            changing.push((change, i, form_factor));
+        for (source, share) in &mut row {
+            if let Ok(i) = kept.binary_search_by_key(&self.light_of(*source), |(light, _)| *light) {
+                *share *= kept[i].1;
+            }
         }
+        row.retain(|(_, share)| *share > 0.0);
+        (near, row)
     }
-    changing.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    changing.truncate(most);
-    changing.sort_by_key(|(_, i, _)| *i);
-    let mut far = row;
-    let mut near = NearRow::with_capacity(changing.len());
-    for (_, i, form_factor) in changing {
-        let (light, share) = far[i];
-        // What a byte cannot hold stays far, so that both together are the whole.
-        let visibility = (share / form_factor * FULL_VISIBILITY).round().clamp(0.0, 255.0);
-        if visibility > 0.0 {
-            near.push((light, visibility as u8));
-            far[i].1 = (share - form_factor * visibility / FULL_VISIBILITY).max(0.0);
-        }
+
+    /// The lights that change most, ascending by light.
+    fn candidates(&self, place: &Place, probe: &Probe, row: &Row, most: usize) -> Vec<Candidate> {
+        let all: f32 = row.iter().map(|(_, share)| share).sum();
+        let mut by_light: Row = row.iter().map(|&(source, share)| (self.light_of(source), share)).collect();
+        by_light.sort_by_key(|(light, _)| *light);
+        let candidate = |same: &[(u32, f32)]| {
+            let light = same[0].0;
+            let share: f32 = same.iter().map(|(_, share)| share).sum();
+            let change = share * change(self.lights, probe, light);
+            if change <= LEAST_CHANGE * all
+                || self.lights.tags[light as usize] != 0
+                || self.gains[light as usize] <= 0.0
+            {
+                return None;
+            }
+            Some(Candidate { change, light, share, form_factor: seen(self.lights, place, light)? })
+        };
+        let mut candidates: Vec<Candidate> =
+            by_light.chunk_by(|a, b| a.0 == b.0).filter_map(candidate).collect();
+        candidates.sort_by(|a, b| b.change.total_cmp(&a.change).then(a.light.cmp(&b.light)));
+        candidates.truncate(most);
+        candidates.sort_by_key(|c| c.light);
+        candidates
     }
-    far.retain(|(_, share)| *share > 0.0);
-    (near, far)
+
+    fn light_of(&self, source: u32) -> u32 {
+        let samples = self.light_of_sample.len() as u32;
+        if source < samples { self.light_of_sample[source as usize] } else { source - samples }
+    }
 }
 
 /// The form factor at a place; `None` where there is none.

@@ -4,8 +4,8 @@ use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 
 use crate::bvh::Hit;
-use crate::shade::{SurfacePoint, TraceScene};
 use crate::reference::cosine_directions;
+use crate::shade::{SurfacePoint, TraceScene};
 use crate::topology::area;
 
 /// Places per probe. Higher values place probes more evenly and find smaller surfaces; each takes [`LOOKS`] rays.

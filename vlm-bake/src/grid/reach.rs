@@ -39,7 +39,9 @@ fn probe(trace: &TraceScene, place: &Place, reach: f32) -> Probe {
     let walls = walls(trace, place, reach);
     let tangent = walls.first().map_or_else(
         || normal.any_orthonormal_vector(),
-        |wall| wall.facing.reject_from(normal).try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector()),
+        |wall| {
+            wall.facing.reject_from(normal).try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector())
+        },
     );
     let bitangent = normal.cross(tangent);
     let mut sides = [reach; 4];
@@ -77,7 +79,8 @@ fn walls(trace: &TraceScene, place: &Place, reach: f32) -> Vec<Wall> {
     let surface = &place.surface;
     let (u, v) = surface.geometric_normal.any_orthonormal_pair();
     let lift = free(trace, surface.position, surface.geometric_normal, LIFT * reach) * 0.9;
-    let origin = trace.bvh.leave(surface.position + surface.geometric_normal * lift, surface.geometric_normal);
+    let origin =
+        trace.bvh.leave(surface.position + surface.geometric_normal * lift, surface.geometric_normal);
     let mut walls: Vec<(f32, Wall)> = (0..AROUND)
         .filter_map(|i| {
             let (sin, cos) = (std::f32::consts::TAU * (i as f32 + 0.5) / AROUND as f32).sin_cos();

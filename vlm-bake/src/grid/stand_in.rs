@@ -1,32 +1,30 @@
-//! Which light stands for a place of the visible surface, as a table over each triangle: rays ask millions of times.
+//! Which sample of which light speaks for a place of the visible surface, as a table over each triangle: rays ask millions of times.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::correspondence::{Correspondence, Light};
 use crate::ground::Ground;
-use crate::samples::BakedLight;
+use crate::samples::{BakedLight, WorldSample};
 use crate::scene::Scene;
 use crate::surface::SurfacePoint;
 use crate::topology::{area, cross_of};
 
-/// Cells of the table per light's area: higher values draw the borders between lights more exactly, and take a search each.
-const CELLS_PER_LIGHT: f64 = 24.0;
+/// Cells of the table per light's area: higher values draw the borders between samples more exactly, and take a search each.
+const CELLS_PER_LIGHT: f64 = 32.0;
 
 /// The most rows into which a triangle is divided.
 const MOST_ROWS: f64 = 64.0;
 
-/// No light.
+/// No sample.
 const NONE: u32 = u32::MAX;
 
-/// Lights by triangle and place.
+/// Samples by triangle and place.
 #[derive(Clone, Debug, Default)]
 pub struct StandIns {
-    /// Per scene triangle: first cell, rows, and whether the back has cells after those of the front. Rows 0: no light.
+    /// Per scene triangle: first cell, rows, and whether the back has cells after those of the front. Rows 0: no sample.
     triangles: Vec<(u32, u16, bool)>,
-    lights: Vec<u32>,
-    /// Per light: radiosity of the surface over its own.
-    ratios: Vec<f32>,
+    samples: Vec<u32>,
 }
 
 impl StandIns {
@@ -39,6 +37,7 @@ impl StandIns {
         let total: f64 = lights.iter().map(Light::area).sum();
         let cell_area = total / (lights.len().max(1) as f64 * CELLS_PER_LIGHT);
         let patches = ground.patches;
+        let starts = sample_starts(baked);
         let table = |(t, scene_triangle): (usize, u32)| {
             let corners = scene.corners(scene_triangle as usize).unwrap_or_default().map(Vec3::as_dvec3);
             let rows = (area(corners) / cell_area).sqrt().ceil().clamp(1.0, MOST_ROWS) as u16;
@@ -47,38 +46,55 @@ impl StandIns {
             let cells = sides.iter().flat_map(|&front| (0..cells(rows)).map(move |cell| (cell, front)));
             let light = |(cell, front)| {
                 let point = point(ground, t, corners, centre(cell, rows), front);
-                near.light_of(&point).or_else(|| near.nearest_of(&point)).unwrap_or(NONE)
+                let light = near.light_of(&point).or_else(|| near.nearest_of(&point));
+                light
+                    .and_then(|l| {
+                        Some(starts[l as usize] + nearest_sample(&baked[l as usize], point.position)?)
+                    })
+                    .unwrap_or(NONE)
             };
             (scene_triangle, rows, two_sided, cells.map(light).collect::<Vec<u32>>())
         };
         let triangles = (0..patches.triangles.len()).into_par_iter();
         let triangles = triangles.flat_map_iter(|t| patches.scene_triangles(t as u32).map(move |s| (t, s)));
         let tables: Vec<_> = triangles.map(table).collect();
-        let ratio = |l: &BakedLight| if l.concentration > 0.0 { 1.0 / l.concentration } else { 0.0 };
-        let mut all = Self {
-            triangles: vec![(0, 0, false); scene.triangles.len()],
-            lights: Vec::new(),
-            ratios: baked.iter().map(ratio).collect(),
-        };
+        let mut all = Self { triangles: vec![(0, 0, false); scene.triangles.len()], samples: Vec::new() };
         for (scene_triangle, rows, two_sided, cells) in tables {
-            all.triangles[scene_triangle as usize] = (all.lights.len() as u32, rows, two_sided);
-            all.lights.extend(cells);
+            all.triangles[scene_triangle as usize] = (all.samples.len() as u32, rows, two_sided);
+            all.samples.extend(cells);
         }
         all
     }
 
-    /// The light that stands for a place, and the radiosity there over that of the light.
+    /// The sample, as the asset numbers them, that speaks for a place.
     #[must_use]
-    pub fn light_at(&self, triangle: u32, barycentric: Vec3, front: bool) -> Option<(u32, f32)> {
+    pub fn sample_at(&self, triangle: u32, barycentric: Vec3, front: bool) -> Option<u32> {
         let &(first, rows, two_sided) = self.triangles.get(triangle as usize)?;
         if rows == 0 {
             return None;
         }
         let side = if front || !two_sided { 0 } else { cells(rows) };
-        let cell = cell_of(barycentric, rows);
-        let &light = self.lights.get((first + side + cell) as usize)?;
-        Some((light, *self.ratios.get(light as usize)?))
+        let sample = self.samples.get((first + side + cell_of(barycentric, rows)) as usize);
+        sample.copied().filter(|&sample| sample != NONE)
     }
+}
+
+/// The number of each light's first sample.
+fn sample_starts(baked: &[BakedLight]) -> Vec<u32> {
+    let mut next = 0;
+    let start = |light: &BakedLight| {
+        let start = next;
+        next += light.samples.len() as u32;
+        start
+    };
+    baked.iter().map(start).collect()
+}
+
+/// The sample of a light nearest to a place, counted from its first.
+fn nearest_sample(light: &BakedLight, place: DVec3) -> Option<u32> {
+    let away = |s: &WorldSample| s.position.distance_squared(place);
+    let nearest = light.samples.iter().zip(0..).min_by(|(a, _), (b, _)| away(a).total_cmp(&away(b)));
+    nearest.map(|(_, number)| number)
 }
 
 /// Cells of a triangle cut into so many rows.

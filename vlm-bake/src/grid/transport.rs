@@ -1,49 +1,90 @@
-//! What share of a probe's light comes from which light, by rays over its hemisphere.
+//! What share of a probe's light comes from which surface, by rays over its hemisphere.
 
 use glam::Mat3;
 use rayon::prelude::*;
+use vlm_shaders::cpu::upload::LightSet;
 
-use super::{GridInput, StandIns};
 use super::pool::Place;
+use super::{GridInput, StandIns};
 use crate::progress::Progress;
 use crate::reference::cosine_directions;
 use crate::shade::{SurfacePoint, TraceScene};
 
-/// Irradiance per radiosity by light, ascending by light.
+/// Irradiance per radiosity by source, ascending by source: samples, then lights.
 pub type Row = Vec<(u32, f32)>;
 
-/// The rows of places, each from `rays` directions. Surface in each direction stands for the light that stands for it, so a row knows
-/// what is hidden from its place, and its sum over lights is what their surface would give.
+/// A light that seems smaller than this (edge over distance) counts as one source, a larger one by its samples. Lower values follow
+/// shadows on far surface more closely, and make rows longer.
+const WHOLE: f32 = 0.2;
+
+/// The rows of places, each from `rays` directions. The surface in each direction is a source's, so a row knows what is hidden from its place,
+/// and its sum is the share of directions that meet surface.
 #[must_use]
 pub fn rows(input: &GridInput, places: &[Place], rays: u32, progress: &dyn Progress) -> Vec<Row> {
+    let light_of_sample = light_of_sample(input.lights);
     let row = |(i, place): (usize, &Place)| {
         progress.advance(1);
-        transport(input.trace, input.stand_ins, &place.surface, rays, i as u64)
+        let row = transport(input.trace, input.stand_ins, &place.surface, rays, i as u64);
+        whole_lights(input.lights, &light_of_sample, place, row)
     };
     places.par_iter().enumerate().map(row).collect()
 }
 
-/// The row of one place; `seed` chooses its directions.
+/// The row of one place, over samples alone; `seed` chooses its directions.
 #[must_use]
-pub fn transport(trace: &TraceScene, stand_ins: &StandIns, surface: &SurfacePoint, rays: u32, seed: u64) -> Row {
+pub fn transport(
+    trace: &TraceScene,
+    stand_ins: &StandIns,
+    surface: &SurfacePoint,
+    rays: u32,
+    seed: u64,
+) -> Row {
     let origin = trace.bvh.leave(surface.position, surface.geometric_normal);
     let (tangent, bitangent) = surface.normal.any_orthonormal_pair();
-    let mut row: Row = Vec::with_capacity(rays as usize);
     let frame = Mat3::from_cols(tangent, bitangent, surface.normal);
+    let mut met: Vec<u32> = Vec::with_capacity(rays as usize);
     for local in cosine_directions(rays, seed) {
         let direction = frame * local;
         if direction.dot(surface.geometric_normal) <= 0.0 {
             continue;
         }
         let hit = trace.path_hit(origin, direction).filter(|hit| trace.is_lit_side(hit));
-        let light = hit.and_then(|hit| stand_ins.light_at(hit.triangle, hit.barycentric, hit.front));
-        row.extend(light.map(|(light, ratio)| (light, ratio / rays as f32)));
+        met.extend(hit.and_then(|hit| stand_ins.sample_at(hit.triangle, hit.barycentric, hit.front)));
     }
-    row.sort_unstable_by_key(|(light, _)| *light);
-    row.dedup_by(|next, first| {
-        let same = next.0 == first.0;
-        first.1 += if same { next.1 } else { 0.0 };
-        same
-    });
-    row
+    met.sort_unstable();
+    met.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as f32 / rays as f32)).collect()
+}
+
+/// The light of each sample.
+pub fn light_of_sample(lights: &LightSet) -> Vec<u32> {
+    let mut light_of = vec![0; lights.samples.len()];
+    for light in 0..lights.len() {
+        let own = lights.sample_range(light).and_then(|range| light_of.get_mut(range));
+        own.into_iter().flatten().for_each(|l| *l = light as u32);
+    }
+    light_of
+}
+
+/// Joins the samples of lights that seem small into the lights themselves.
+fn whole_lights(lights: &LightSet, light_of_sample: &[u32], place: &Place, row: Row) -> Row {
+    let samples = lights.samples.len() as u32;
+    let mut joined: Row = Vec::with_capacity(row.len());
+    let mut whole: Row = Vec::new();
+    for own in row.chunk_by(|a, b| light_of_sample[a.0 as usize] == light_of_sample[b.0 as usize]) {
+        let light = light_of_sample[own[0].0 as usize];
+        if own.len() > 1 && seems_small(lights, light, place) {
+            whole.push((samples + light, own.iter().map(|(_, share)| share).sum()));
+        } else {
+            joined.extend_from_slice(own);
+        }
+    }
+    joined.extend(whole);
+    joined
+}
+
+fn seems_small(lights: &LightSet, light: u32, place: &Place) -> bool {
+    let corners = lights.geometry[light as usize].corners();
+    let centroid = (corners[0] + corners[1] + corners[2]) / 3.0;
+    let edge = (0..3).map(|i| corners[i].distance(corners[(i + 1) % 3])).fold(0.0, f32::max);
+    edge < WHOLE * centroid.distance(place.surface.position)
 }

@@ -2,10 +2,9 @@
 
 use glam::{DVec3, IVec3, Vec3};
 use rayon::prelude::*;
-use vlm_format::{Grid, Leaf, MOST_PROBES, NearLight, Probe};
+use vlm_format::{Grid, Leaf, MOST_PROBES, Probe};
 use vlm_shaders::cpu::grid::leaf_at;
 
-use super::near::NearRow;
 use super::pool::Place;
 use crate::scene::Scene;
 use crate::topology::Lists;
@@ -19,73 +18,31 @@ pub const DEFAULT_CELLS: f64 = 16.0;
 /// How often a cell is divided at most.
 const DEEPEST: u32 = 6;
 
-/// A grid whose probes have no rows yet.
-pub struct Tree {
-    /// Cells, leaves and their probes.
-    pub grid: Grid,
-}
-
-impl Tree {
-    /// Divides the cells that hold surface.
-    #[must_use]
-    pub fn new(scene: &Scene, bounds: [DVec3; 2], probes: &[Probe], cell_size: Option<f32>) -> Self {
-        let mut grid = lattice(bounds, cell_size);
-        let size = f64::from(grid.cell_size);
-        let roots: usize = grid.dimensions.iter().map(|&d| d as usize).product();
-        let corner = |cell: IVec3| grid.origin.as_dvec3() + cell.as_dvec3() * size;
-        let triangles = triangles_by_cell(scene, &grid, roots);
-        let probes_of = probes_by_cell(probes, &grid, roots);
-        let builder = Builder { scene, probes };
-        let built: Vec<Node> = (0..roots)
-            .into_par_iter()
-            .map(|cell| {
-                let place = cell_place(cell, grid.dimensions);
-                let bounds = Cube { low: corner(place), size };
-                builder.node(&bounds, triangles.of(cell), probes_of.of(cell), 0)
-            })
-            .collect();
-        grid.probes = probes.to_vec();
-        grid.surface_probes = probes.len() as u32;
-        grid.cells = vec![0; roots];
-        built.into_iter().enumerate().for_each(|(cell, node)| store(&mut grid, cell, node));
-        let end = grid.leaf_probes.len() as u32;
-        grid.leaves.push(Leaf { probes: end, free_probes: end, near: 0, padding: 0 });
-        Self { grid }
-    }
-
-    /// Fills the leaves' lists of near lights from those of their probes.
-    pub fn add_near(&mut self, near: &[NearRow]) {
-        let grid = &mut self.grid;
-        let lists: Vec<Vec<NearLight>> =
-            grid.leaves.par_windows(2).map(|leaf| leaf_near(&grid.leaf_probes, leaf, near)).collect();
-        let mut start = 0;
-        for (leaf, list) in grid.leaves.iter_mut().zip(&lists) {
-            leaf.near = start;
-            start += list.len() as u32;
-        }
-        if let Some(end) = grid.leaves.last_mut() {
-            end.near = start;
-        }
-        grid.near = lists.concat();
-    }
-}
-
-/// All near lights of a leaf's probes, with a byte for each probe.
-fn leaf_near(leaf_probes: &[u32], leaf: &[Leaf], near: &[NearRow]) -> Vec<NearLight> {
-    let probes = &leaf_probes[leaf[0].probes as usize..leaf[0].free_probes as usize];
-    let entries = probes.iter().enumerate().flat_map(|(slot, &probe)| {
-        near[probe as usize].iter().map(move |&(light, visibility)| (light, slot, visibility))
-    });
-    let mut entries: Vec<(u32, usize, u8)> = entries.collect();
-    entries.sort_unstable();
-    let merge = |same: &[(u32, usize, u8)]| {
-        let mut merged = NearLight { light: same[0].0, visibility: [0; 4] };
-        for &(_, slot, visibility) in same {
-            merged.visibility[slot / 4] |= u32::from(visibility) << (8 * (slot % 4));
-        }
-        merged
-    };
-    entries.chunk_by(|a, b| a.0 == b.0).map(merge).collect()
+/// Divides the cells that hold surface: a grid whose probes have no rows yet.
+#[must_use]
+pub fn tree(scene: &Scene, bounds: [DVec3; 2], probes: &[Probe], cell_size: Option<f32>) -> Grid {
+    let mut grid = lattice(bounds, cell_size);
+    let size = f64::from(grid.cell_size);
+    let roots: usize = grid.dimensions.iter().map(|&d| d as usize).product();
+    let corner = |cell: IVec3| grid.origin.as_dvec3() + cell.as_dvec3() * size;
+    let triangles = triangles_by_cell(scene, &grid, roots);
+    let probes_of = probes_by_cell(probes, &grid, roots);
+    let builder = Builder { scene, probes };
+    let built: Vec<Node> = (0..roots)
+        .into_par_iter()
+        .map(|cell| {
+            let place = cell_place(cell, grid.dimensions);
+            let bounds = Cube { low: corner(place), size };
+            builder.node(&bounds, triangles.of(cell), probes_of.of(cell), 0)
+        })
+        .collect();
+    grid.probes = probes.to_vec();
+    grid.surface_probes = probes.len() as u32;
+    grid.cells = vec![0; roots];
+    built.into_iter().enumerate().for_each(|(cell, node)| store(&mut grid, cell, node));
+    let end = grid.leaf_probes.len() as u32;
+    grid.leaves.push(Leaf { probes: end, free_probes: end });
+    grid
 }
 
 /// A place is reached where the weights of its probes sum to this. Lower values leave more places to the very edge of some probe's reach.
@@ -210,7 +167,7 @@ fn store(grid: &mut Grid, cell: usize, node: Node) {
             let start = grid.leaf_probes.len() as u32;
             grid.leaf_probes.extend(probes);
             let end = grid.leaf_probes.len() as u32;
-            grid.leaves.push(Leaf { probes: start, free_probes: end, near: 0, padding: 0 });
+            grid.leaves.push(Leaf { probes: start, free_probes: end });
         }
         Node::Divided(children) => {
             let first = grid.cells.len();
@@ -236,10 +193,16 @@ fn probes_by_cell(probes: &[Probe], grid: &Grid, cells: usize) -> Lists {
 }
 
 /// Scatters things with boxes over the cells that these touch: counted, then filled.
-fn scatter(count: usize, bounds: impl Fn(usize) -> (DVec3, DVec3) + Sync, grid: &Grid, cells: usize) -> Lists {
+fn scatter(
+    count: usize,
+    bounds: impl Fn(usize) -> (DVec3, DVec3) + Sync,
+    grid: &Grid,
+    cells: usize,
+) -> Lists {
     let size = f64::from(grid.cell_size);
     let most = IVec3::from_array(grid.dimensions.map(|d| d as i32)) - 1;
-    let cell_of = |p: DVec3| ((p - grid.origin.as_dvec3()) / size).floor().as_ivec3().clamp(IVec3::ZERO, most);
+    let cell_of =
+        |p: DVec3| ((p - grid.origin.as_dvec3()) / size).floor().as_ivec3().clamp(IVec3::ZERO, most);
     let [nx, ny, _] = grid.dimensions;
     let touched = |i: usize| {
         let (low, high) = bounds(i);

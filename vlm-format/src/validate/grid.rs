@@ -7,24 +7,38 @@ use crate::grid::{Grid, Leaf, MOST_PROBES, Probe};
 /// How far a frame's axes may be from unit length and from each other's plane.
 const FRAME_SLACK: f32 = 1e-3;
 
-pub(super) fn grid(grid: &Grid, lights: usize, issues: &mut Issues) {
+pub(super) fn grid(grid: &Grid, lights: usize, samples: usize, issues: &mut Issues) {
     let positive = grid.origin.is_finite() && grid.cell_size.is_finite() && grid.cell_size > 0.0;
     issues.check(positive, Code::VlmNumber, "/grid", || {
         String::from("origin or cell size is not finite, or no cell has a size")
     });
     cells(grid, issues);
     leaves(grid, issues);
-    issues.check_all(&grid.leaf_probes, Code::VlmIndex, "/grid/leaf_probes", "there is no such probe", |&probe| {
-        (probe as usize) < grid.probes.len()
-    });
+    issues.check_all(
+        &grid.leaf_probes,
+        Code::VlmIndex,
+        "/grid/leaf_probes",
+        "there is no such probe",
+        |&probe| (probe as usize) < grid.probes.len(),
+    );
     issues.check_all(&grid.near, Code::VlmIndex, "/grid/near", "there is no such light", |near| {
-        (near.light as usize) < lights
+        (near.light() as usize) < lights
     });
-    issues.check_all(&grid.probes, Code::VlmNumber, "/grid/probes", "its place, frame or reach is broken", sound);
-    issues.check(grid.surface_probes as usize <= grid.probes.len(), Code::VlmRange, "/grid/surface_probes", || {
-        format!("{} of {} probes", grid.surface_probes, grid.probes.len())
-    });
-    rows(grid, lights, issues);
+    issues.check_all(
+        &grid.probes,
+        Code::VlmNumber,
+        "/grid/probes",
+        "its place, frame or reach is broken",
+        sound,
+    );
+    issues.check(
+        grid.surface_probes as usize <= grid.probes.len(),
+        Code::VlmRange,
+        "/grid/surface_probes",
+        || format!("{} of {} probes", grid.surface_probes, grid.probes.len()),
+    );
+    sources(grid, lights, samples, issues);
+    rows(grid, lights + samples, issues);
 }
 
 /// Every cell leads to a leaf, to a later group of eight that exists, or nowhere; so descending ends.
@@ -42,16 +56,19 @@ fn cells(grid: &Grid, issues: &mut Issues) {
     let leads = |(at, &cell): (usize, &u32)| {
         let to = cell as usize / 2;
         let leaf = cell % 2 == 1;
-        if leaf { to < leaves } else { to == 0 || (to > at && to.checked_add(8).is_some_and(|end| end <= grid.cells.len())) }
+        if leaf {
+            to < leaves
+        } else {
+            to == 0 || (to > at && to.checked_add(8).is_some_and(|end| end <= grid.cells.len()))
+        }
     };
     if let Some(at) = grid.cells.iter().enumerate().position(|cell| !leads(cell)) {
-        issues.check(false, Code::VlmIndex, &format!("/grid/cells/{at}"), || String::from("it leads nowhere"));
+        issues
+            .check(false, Code::VlmIndex, &format!("/grid/cells/{at}"), || String::from("it leads nowhere"));
     }
 }
 
 fn leaves(grid: &Grid, issues: &mut Issues) {
-    let near: Vec<u32> = grid.leaves.iter().map(|leaf| leaf.near).collect();
-    check_starts(&near, grid.near.len(), "/grid/leaves", issues);
     let probes: Vec<u32> = grid.leaves.iter().map(|leaf| leaf.probes).collect();
     check_starts(&probes, grid.leaf_probes.len(), "/grid/leaves", issues);
     let fits = |pair: &[Leaf]| {
@@ -76,7 +93,37 @@ fn sound(probe: &Probe) -> bool {
         && reaches.into_iter().all(|reach| reach.is_finite() && reach > 0.0)
 }
 
-fn rows(grid: &Grid, lights: usize, issues: &mut Issues) {
+fn sources(grid: &Grid, lights: usize, samples: usize, issues: &mut Issues) {
+    for (pointer, values, count) in [
+        ("/grid/sample_shares", &grid.sample_shares, samples),
+        ("/grid/surface_gains", &grid.surface_gains, lights),
+    ] {
+        issues.check(values.len() == count, Code::VlmLength, pointer, || {
+            format!("{} values for {count} sources", values.len())
+        });
+    }
+    issues.check_all(
+        &grid.sample_shares,
+        Code::VlmNumber,
+        "/grid/sample_shares",
+        "not a number above 0",
+        |share| share.is_finite() && *share > 0.0,
+    );
+    issues.check_all(
+        &grid.surface_gains,
+        Code::VlmNumber,
+        "/grid/surface_gains",
+        "not a number of 0 or more",
+        |gain| gain.is_finite() && *gain >= 0.0,
+    );
+}
+
+fn rows(grid: &Grid, sources: usize, issues: &mut Issues) {
+    let fits = grid.near_starts.len() == grid.probes.len() + 1;
+    issues.check(fits, Code::VlmLength, "/grid/near_starts", || {
+        format!("{} offsets for {} probes", grid.near_starts.len(), grid.probes.len())
+    });
+    check_starts(&grid.near_starts, grid.near.len(), "/grid/near_starts", issues);
     let fits = grid.row_starts.len() == grid.probes.len() + 1;
     issues.check(fits, Code::VlmLength, "/grid/row_starts", || {
         format!("{} offsets for {} probes", grid.row_starts.len(), grid.probes.len())
@@ -86,10 +133,10 @@ fn rows(grid: &Grid, lights: usize, issues: &mut Issues) {
     issues.check(entries.div_ceil(2) == grid.rows.len(), Code::VlmLength, "/grid/rows", || {
         format!("{} words for {entries} entries", grid.rows.len())
     });
-    let known = |probe: &usize| grid.row(*probe).all(|(light, _)| (light as usize) < lights);
+    let known = |probe: &usize| grid.row(*probe).all(|(light, _)| (light as usize) < sources);
     if let Some(probe) = (0..grid.probes.len()).find(|probe| !known(probe)) {
         issues.check(false, Code::VlmIndex, &format!("/grid/rows/{probe}"), || {
-            String::from("it names a light that does not exist")
+            String::from("it names a source that does not exist")
         });
     }
 }
@@ -109,9 +156,10 @@ pub(super) mod tests {
             cell_size: 1.0,
             dimensions: [1, 1, 1],
             cells: vec![1],
-            leaves: vec![Leaf::default(), Leaf { probes: 1, free_probes: 1, near: 1, padding: 0 }],
+            leaves: vec![Leaf::default(), Leaf { probes: 1, free_probes: 1 }],
             leaf_probes: vec![0],
-            near: vec![NearLight { light: 0, visibility: [128, 0, 0, 0] }],
+            near_starts: vec![0, 1],
+            near: vec![NearLight::new(0, 128)],
             probes: vec![Probe {
                 normal: Vec3::Y,
                 tangent: Vec3::X,
@@ -122,6 +170,8 @@ pub(super) mod tests {
                 ..Probe::default()
             }],
             surface_probes: 1,
+            sample_shares: vec![1.0; 2],
+            surface_gains: vec![1.0; 2],
             row_starts: rows.starts,
             rows: rows.words,
             ..Grid::default()
