@@ -2,12 +2,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use glam::{DMat3, DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec3, Vec3};
 use vlm_bake::bake::{Bake, bake};
 use vlm_bake::options::{BakeOptions, Preset};
 use vlm_bake::progress::Silent;
 use vlm_bake::scene::{LoadOptions, Scene, load};
-use vlm_format::{GltfFile, Grid, VlmAsset};
+use vlm_format::{GltfFile, Grid, Leaf, NearLight, VlmAsset};
+use vlm_shaders::cpu::grid::leaf_at;
 use vlm_tests::assets;
 
 /// A light in world space.
@@ -63,7 +64,7 @@ fn world_light(asset: &VlmAsset, light: usize, world: DMat4) -> Light {
 }
 
 /// Everything that is wrong with a bake, in words.
-fn faults(scene: &Scene, Bake { asset, report }: &Bake) -> Vec<String> {
+fn faults(scene: &Scene, Bake { asset, report, .. }: &Bake) -> Vec<String> {
     let lights = lights(scene, asset);
     let mut faults = Vec::new();
     let mut check = |holds: bool, what: String| {
@@ -88,10 +89,13 @@ fn faults(scene: &Scene, Bake { asset, report }: &Bake) -> Vec<String> {
     check(finite, "a number is not finite".to_owned());
     let lit = lights.iter().filter(|l| lights_itself(l)).count();
     check(lit == 0, format!("{lit} untagged lights light a point for which they stand"));
-    let range = f64::from(asset.settings.range);
-    let (extra, missing) = asset.grid.as_ref().map_or((0, 0), |grid| grid_errors(grid, &lights, range));
-    check(extra == 0, format!("{extra} lights listed in cells that they do not reach"));
-    check(missing == 0, format!("{missing} lights missing from cells that they reach"));
+    if let Some(grid) = &asset.grid {
+        let [unserved, unsorted, bright, tagged] = grid_errors(grid, asset, &lights);
+        check(unserved == 0, format!("{unserved} places without probes"));
+        check(unsorted == 0, format!("{unsorted} leaves whose probes do not ascend"));
+        check(bright == 0, format!("{bright} probes that see more than a hemisphere"));
+        check(tagged == 0, format!("{tagged} tagged lights among the near ones"));
+    }
     faults
 }
 
@@ -115,41 +119,24 @@ fn lies_behind(light: &Light) -> bool {
     light.samples.iter().all(|&(x, n)| light.corners.iter().all(|v| (*v - x).dot(n) < 0.0))
 }
 
-/// Wrong and missing entries: each stored cell against each light that it lists, some cells against all lights.
-fn grid_errors(grid: &Grid, lights: &[Light], range: f64) -> (usize, usize) {
-    let (mut extra, mut missing) = (0, 0);
-    let stride = (grid.cells.len() / 50).max(1);
-    for (i, ends) in grid.starts.windows(2).enumerate() {
-        let list = &grid.entries[ends[0] as usize..ends[1] as usize];
-        let cell = cell_box(grid, grid.cells[i]);
-        extra += list.iter().filter(|&&l| !reaches(&lights[l as usize], cell, range, 1e-3)).count();
-        if i % stride == 0 {
-            let unlisted = (0..lights.len() as u32).filter(|l| list.binary_search(l).is_err());
-            missing += unlisted.filter(|&l| reaches(&lights[l as usize], cell, range, -1e-3)).count();
-        }
-    }
-    (extra, missing)
-}
-
-fn cell_box(grid: &Grid, number: u32) -> [DVec3; 2] {
-    let [x, y, _] = grid.dimensions;
-    let cell = DVec3::new(f64::from(number % x), f64::from(number / x % y), f64::from(number / x / y));
-    let size = f64::from(grid.cell_size);
-    let low = grid.origin.as_dvec3() + size * cell;
-    [low, low + size]
-}
-
-/// The half ball in front of a light, `range` times as large as the light, touches the box; with a slack above 0 also where
-/// it misses it by that share of its size, below 0 only where it overlaps by that.
-fn reaches(light: &Light, [low, high]: [DVec3; 2], range: f64, slack: f64) -> bool {
-    let centre = light.corners.iter().sum::<DVec3>() / 3.0;
-    let radius = range * light.corners.iter().map(|v| v.distance(centre)).fold(0.0, f64::max);
-    let nearest = centre.distance(centre.clamp(low, high));
-    let highest = (0..8)
-        .map(|i| DVec3::select(glam::BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0), high, low))
-        .map(|corner| (corner - centre).dot(light.normal))
-        .fold(f64::NEG_INFINITY, f64::max);
-    nearest <= radius * (1.0 + slack) && highest > -slack * (high - low).x
+/// Places of the visible surface that no leaf's probes serve, leaves whose lists do not ascend, probes whose row gives more light than there
+/// is, and near lights that are tagged.
+fn grid_errors(grid: &Grid, asset: &VlmAsset, lights: &[Light]) -> [usize; 4] {
+    let served = |place: Vec3| {
+        leaf_at(grid, place)
+            .is_some_and(|leaf| grid.leaves[leaf as usize].probes < grid.leaves[leaf as usize + 1].probes)
+    };
+    let unserved =
+        lights.iter().flat_map(|l| &l.samples).filter(|(place, _)| !served(place.as_vec3())).count();
+    let list = |leaf: &[Leaf]| &grid.leaf_probes[leaf[0].probes as usize..leaf[0].free_probes as usize];
+    let unsorted = grid.leaves.windows(2).filter(|leaf| !list(leaf).is_sorted_by(|a, b| a < b)).count();
+    let sum = |probe: usize| {
+        grid.row(probe).map(|(_, weight)| weight as f32 * grid.probes[probe].row_scale).sum::<f32>()
+    };
+    let bright = (0..grid.probes.len()).filter(|&probe| sum(probe) > 1.02).count();
+    let tag = |near: &NearLight| asset.tags.get(near.light() as usize).copied().unwrap_or(0);
+    let tagged = grid.near.iter().filter(|near| tag(near) != 0).count();
+    [unserved, unsorted, bright, tagged]
 }
 
 fn check_folder(folder: &str, skip: &[&str], most_lights: u32) {
@@ -202,21 +189,23 @@ fn a_light_that_is_pushed_forward_is_seen() {
 }
 
 #[test]
-fn a_list_with_a_wrong_or_a_missing_light_is_seen() {
+fn a_broken_grid_is_seen() {
     let scene = open(concat!(env!("CARGO_MANIFEST_DIR"), "/../assets"), "cornell.glb");
-    let mut bake = bake(&scene, &options(&scene, 460), &Silent).unwrap();
-    let lights = lights(&scene, &bake.asset);
-    let range = f64::from(bake.asset.settings.range);
-    let grid = bake.asset.grid.as_mut().unwrap();
-    assert_eq!(grid_errors(grid, &lights, range), (0, 0));
-    let (first, end) = (grid.starts[0] as usize, grid.starts[1] as usize);
-    assert!(end - first < lights.len());
-    let unlisted = (0..lights.len() as u32).find(|l| !grid.entries[first..end].contains(l)).unwrap();
-    grid.entries[first] = unlisted;
-    grid.entries[first..end].sort_unstable();
-    let (extra, missing) = grid_errors(grid, &lights, range);
-    assert_eq!(extra, 1);
-    assert!(missing >= 1);
+    let mut asset = bake(&scene, &options(&scene, 460), &Silent).unwrap().asset;
+    let lights = lights(&scene, &asset);
+    let grid = asset.grid.take().unwrap();
+    assert_eq!(grid_errors(&grid, &asset, &lights), [0; 4]);
+    let spoilt = |spoil: &dyn Fn(&mut Grid)| {
+        let mut grid = grid.clone();
+        spoil(&mut grid);
+        grid_errors(&grid, &asset, &lights)
+    };
+    assert!(spoilt(&|grid| grid.cells.fill(0))[0] > 0);
+    assert!(spoilt(&|grid| grid.leaf_probes.reverse())[1] > 0);
+    assert!(spoilt(&|grid| grid.probes.iter_mut().for_each(|probe| probe.row_scale *= 2.0))[2] > 0);
+    let mut tagged = asset.clone();
+    tagged.tags = vec![1; tagged.triangles.len()];
+    assert!(grid_errors(&grid, &tagged, &lights)[3] > 0);
 }
 
 #[test]

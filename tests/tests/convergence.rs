@@ -8,6 +8,7 @@ use vlm_bake::scene::{LoadOptions, load};
 use vlm_bake::shade::TraceScene;
 use vlm_format::GltfFile;
 use vlm_tests::method::{Method, Stage, View};
+use vlm_tests::methods::brute::Brute;
 use vlm_tests::methods::ddgi::Ddgi;
 use vlm_tests::methods::instant_radiosity::InstantRadiosity;
 use vlm_tests::methods::vlm::Vlm;
@@ -52,8 +53,10 @@ fn rivals_converge_in_the_cornell_box_and_lights_without_occlusion_do_not() {
     assert!(by_probes[1] < by_probes[0] && by_probes[2] < by_probes[1], "{by_probes:?}");
     assert!(by_probes[2] < 0.09, "{by_probes:?}");
 
-    let unoccluded =
-        [460, 1840].map(|lights| Vlm { preset: Preset::Game, lights, cell: None, range: Some(1e4) });
+    let by_grid = errors(&[&Vlm { preset: Preset::Game, lights: 460, probes: 1.0 }]);
+    assert!(by_grid[0] < 0.09, "{by_grid:?}");
+
+    let unoccluded = [460, 1840].map(|lights| Brute { lights });
     let by_area_lights = errors(&unoccluded.each_ref().map(|m| m as &dyn Method));
     assert!(
         by_area_lights.iter().all(|error| *error > 0.14),

@@ -78,7 +78,7 @@ fn every_method_gives_the_known_answers_and_would_fail_with_others() {
 
 #[test]
 fn the_proof_of_a_whole_method_refuses_a_changed_one() {
-    let method = Vlm { preset: Preset::Game, lights: 1000, cell: None, range: Some(1e4) };
+    let method = Vlm { preset: Preset::Game, lights: 1000, probes: 1.0 };
     assert_eq!(prove_method(&method, 0.03), Ok(()));
     for change in CHANGES {
         let changed = Changed { method: &method, change, gives_indirect_light: true };

@@ -31,9 +31,9 @@ impl<'a> Frame<'a> {
         let mut gathered = Gathered { irradiance: self.far_light(&blend, receiver), pairs: 0 };
         // The probes' lists ascend, so each light is met once, with all probes that see it.
         let mut lists = [&[] as &[NearLight]; MOST_PROBES];
-        for i in 0..blend.count as usize {
+        for (i, list) in lists.iter_mut().enumerate().take(blend.count as usize) {
             if blend.weights[i] > 0.0 {
-                lists[i] = self.near(&blend, i);
+                *list = self.near(&blend, i);
             }
         }
         loop {

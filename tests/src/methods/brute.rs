@@ -19,9 +19,10 @@ fn sweep(stage: &Stage<'_>) -> Vec<Box<dyn Method>> {
     [game / 4, game, 4 * game].map(|lights| Box::new(Brute { lights }) as Box<dyn Method>).into()
 }
 
-struct Brute {
+/// The method at one setting.
+pub struct Brute {
     /// Asked of the baker. More follow shape and shadow better; time grows in proportion.
-    lights: u32,
+    pub lights: u32,
 }
 
 impl Method for Brute {

@@ -25,7 +25,7 @@ pub fn rows(input: &GridInput, places: &[Place], rays: u32, progress: &dyn Progr
     let row = |(i, place): (usize, &Place)| {
         progress.advance(1);
         let row = transport(input.trace, input.stand_ins, &place.surface, rays, i as u64);
-        whole_lights(input.lights, &light_of_sample, place, row)
+        whole_lights(input.lights, &light_of_sample, place, &row)
     };
     places.par_iter().enumerate().map(row).collect()
 }
@@ -66,7 +66,7 @@ pub fn light_of_sample(lights: &LightSet) -> Vec<u32> {
 }
 
 /// Joins the samples of lights that seem small into the lights themselves.
-fn whole_lights(lights: &LightSet, light_of_sample: &[u32], place: &Place, row: Row) -> Row {
+fn whole_lights(lights: &LightSet, light_of_sample: &[u32], place: &Place, row: &Row) -> Row {
     let samples = lights.samples.len() as u32;
     let mut joined: Row = Vec::with_capacity(row.len());
     let mut whole: Row = Vec::new();

@@ -90,8 +90,8 @@ fn inspect_counts() {
     assert_eq!(content["vlms"][0]["node"], json!(0));
     assert_eq!(content["settings"]["preset"], json!("game"));
     let grid = asset.grid.unwrap();
-    assert_eq!(content["grid"]["entries"], json!(grid.entries.len()));
-    assert_eq!(content["grid"]["stored_cells"], json!(grid.cells.len()));
+    assert_eq!(content["grid"]["near_entries"], json!(grid.near.len()));
+    assert_eq!(content["grid"]["probes"], json!(grid.probes.len()));
     let lines = run(["inspect", &baked]);
     assert!(text(&lines.stdout).contains("vlm       room (node 0)"), "{}", text(&lines.stdout));
 }
