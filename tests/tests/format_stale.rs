@@ -64,7 +64,7 @@ fn renumbered_accessors_are_named() {
     assert_stale(
         remove,
         &[
-            "/extensions/VLM_virtual_light_mesh/grid/entries",
+            "/extensions/VLM_virtual_light_mesh/grid/rows",
             "/meshes/1/primitives/0/extensions/VLM_virtual_light_mesh/triangleTags",
             "is no index into /accessors",
         ],

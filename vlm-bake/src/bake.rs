@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use glam::Vec3A;
-use rayon::prelude::*;
 use vlm_format::{Grid, VlmAsset};
 
 use crate::authored;
@@ -113,7 +112,7 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
 
     clock.stage("samples");
     let accused = accusations(&patches, lights, violations);
-    let spoken_for = spoken_for(&ground, lights, &points, &hidden.light_of_point);
+    let standing = points_of_lights(&hidden.light_of_point, lights.len());
     let sources = Sources {
         scene,
         patches: &patches,
@@ -121,7 +120,7 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
         rest_areas: &hidden.rest_areas,
         accused: &accused,
         points: &points,
-        standing: &points_of_lights(&spoken_for, lights.len()),
+        standing: &standing,
     };
     let mut baked = samples(&sources, lights, options.samples);
     let flux = conserve(scene, &patches, &surfaces, &points, &mut baked);
@@ -219,20 +218,6 @@ fn measured_distance(points: &[SurfacePoint], light_of_point: &[Option<u32>], fa
 fn deepest(clearance: f64, mean: f64, error: f64) -> f64 {
     let of_mean = DEEPEST_OF_MEAN * (clearance + mean);
     of_mean.min(DEEPEST_OF_ERROR * error + DEEPEST_OF_CLEARANCE * clearance)
-}
-
-/// The light of each point, and for points that no light stands for the nearest: its samples speak for them too.
-fn spoken_for(
-    ground: &Ground,
-    lights: &[Light],
-    points: &[SurfacePoint],
-    light_of_point: &[Option<u32>],
-) -> Vec<Option<u32>> {
-    let stands = points_of_lights(light_of_point, lights.len());
-    let search = Correspondence::new(ground, lights, |l| !stands.of(l).is_empty());
-    let light =
-        |(point, light): (&SurfacePoint, &Option<u32>)| light.or_else(|| search.nearest_in_region(point));
-    points.par_iter().zip(light_of_point).map(light).collect()
 }
 
 /// The artist's density per face; 0 where a face stands for nothing, or where the offset made it too thin to be a light.

@@ -20,7 +20,7 @@ use crate::topology::{area, cross_of};
 const COSTLY_ERROR: f32 = 2e-3;
 
 /// The share of the budget that decimation may take then.
-const MOST_SHARE: f64 = 0.45;
+const MOST_SHARE: f64 = 0.85;
 
 /// A triangle mesh between decimation and the final lights, in world space.
 #[derive(Clone, Debug, Default)]

@@ -159,12 +159,9 @@ pub fn check(
     let placed = placed_lights(scene, asset, ground);
     let lights: Vec<Light> = placed.iter().map(|p| p.light).collect();
     let derived = |l: usize| !placed[l].authored && placed[l].stands;
-    let search = Correspondence::new(ground, &lights, derived);
-    let mut light_of_point = search.of(&points);
+    let mut light_of_point = Correspondence::new(ground, &lights, derived).of(&points);
     for (l, light) in placed.iter().enumerate() {
-        // A sample may lie on surface that its light does not cover, and only speaks for.
-        let own = |sample| if light.authored { Some(l as u32) } else { search.light_of(sample) };
-        light_of_point.extend(light.samples.iter().map(own));
+        light_of_point.extend(light.samples.iter().map(|_| Some(l as u32)));
         points.extend(&light.samples);
     }
     let standing = points_of_lights(&light_of_point, lights.len());

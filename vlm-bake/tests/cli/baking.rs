@@ -45,7 +45,7 @@ fn summary_says_what_was_made_and_where_the_picture_is() {
     lights    [n] of [n] asked, for [n] visible triangles; decimation error [n] mm
     clearance [n] of [n] surface points violated; lights lie [n] mm deep on average, [n] mm required
     tags      [n] ([n] % of the lights' area)
-    grid      [n] of [n] cells stored, [n] entries, [n] kB
+    grid      [n] probes in [n] cells; [n] near lights, [n] far; [n] kB
     time      [n] s
     picture   [path]  (camera camera, radiance in nt times [n])
     ");
@@ -71,9 +71,10 @@ fn report_has_the_keys_that_others_read() {
         "/clearance/samples",
         "/clearance/violations",
         "/clearance/worst_m",
-        "/grid/cells",
-        "/grid/stored_cells",
-        "/grid/entries",
+        "/grid/leaves",
+        "/grid/probes",
+        "/grid/near_entries",
+        "/grid/far_entries",
         "/grid/bytes",
         "/seconds/decimate",
         "/asked_lights",
