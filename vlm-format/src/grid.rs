@@ -169,12 +169,24 @@ impl Grid {
     /// Bytes of all arrays.
     #[must_use]
     pub fn byte_len(&self) -> usize {
-        let words = self.cells.len() + self.leaf_probes.len() + self.row_starts.len() + self.rows.len();
-        let words = words + self.sample_shares.len() + self.surface_gains.len() + self.near_starts.len();
-        size_of_val(&*self.leaves)
-            + size_of_val(&*self.near)
-            + size_of_val(&*self.probes)
-            + size_of::<u32>() * words
+        self.sizes().iter().map(|(_, bytes)| bytes).sum()
+    }
+
+    /// Bytes of each array, by its name in the file.
+    #[must_use]
+    pub fn sizes(&self) -> [(&'static str, usize); 10] {
+        [
+            ("cells", size_of_val(&*self.cells)),
+            ("leaves", size_of_val(&*self.leaves)),
+            ("leafProbes", size_of_val(&*self.leaf_probes)),
+            ("probes", size_of_val(&*self.probes)),
+            ("nearStarts", size_of_val(&*self.near_starts)),
+            ("near", size_of_val(&*self.near)),
+            ("sampleShares", size_of_val(&*self.sample_shares)),
+            ("surfaceGains", size_of_val(&*self.surface_gains)),
+            ("rowStarts", size_of_val(&*self.row_starts)),
+            ("rows", size_of_val(&*self.rows)),
+        ]
     }
 
     /// The near lights of a probe; empty where indices are out of range.
