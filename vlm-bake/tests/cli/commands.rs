@@ -92,8 +92,42 @@ fn inspect_counts() {
     let grid = asset.grid.unwrap();
     assert_eq!(content["grid"]["near_entries"], json!(grid.near.len()));
     assert_eq!(content["grid"]["probes"], json!(grid.probes.len()));
+    assert_eq!(content["grid"]["leaves"], json!(grid.leaves.len() - 1));
+    let sum = |list: &str, key: &str| -> u64 {
+        content["grid"][list].as_array().unwrap().iter().map(|item| item[key].as_u64().unwrap()).sum()
+    };
+    for histogram in ["probes_of_leaves", "near_lights_of_leaves"] {
+        assert_eq!(sum(histogram, "count"), grid.leaves.len() as u64 - 1, "{histogram}");
+    }
+    let levels = content["grid"]["leaves_by_level"].as_array().unwrap();
+    assert_eq!(levels.iter().map(|n| n.as_u64().unwrap()).sum::<u64>(), grid.leaves.len() as u64 - 1);
+    assert_eq!(sum("bytes_by_array", "bytes"), grid.byte_len() as u64);
     let lines = run(["inspect", &baked]);
-    assert!(text(&lines.stdout).contains("vlm       room (node 0)"), "{}", text(&lines.stdout));
+    for line in ["vlm       room (node 0)", "grid      ", "bytes     rows", " #"] {
+        assert!(text(&lines.stdout).contains(line), "{line} in {}", text(&lines.stdout));
+    }
+}
+
+#[test]
+fn the_grid_is_as_large_as_asked_or_not_there() {
+    let folders = Folders::new();
+    let bake = |flags: &[&str]| folders.bake(&Document::room(), &[&["--lights", "60"], flags].concat());
+    // However few are asked, probes lie no farther apart than a 16th of the scene.
+    let (coarse, fine) = (bake(&["--probes", "20"]), bake(&["--probes", "6000"]));
+    let probes = |asset: &VlmAsset| asset.grid.as_ref().unwrap().probes.len();
+    assert!(3 * probes(&coarse) < 2 * probes(&fine), "{} and {}", probes(&coarse), probes(&fine));
+    assert_eq!((coarse.settings.probes, fine.settings.probes), (20, 6000));
+
+    let near = |asset: &VlmAsset| asset.grid.as_ref().unwrap().near.len();
+    assert_eq!(near(&bake(&["--probes", "20", "--near", "0"])), 0);
+    assert!(near(&coarse) > 0);
+    let rows = |asset: &VlmAsset| asset.grid.as_ref().unwrap().rows.len();
+    assert!(rows(&bake(&["--probes", "20", "--rays", "16"])) < rows(&coarse), "few rays meet fewer sources");
+
+    assert_eq!(bake(&["--probes", "0"]).grid, None);
+    let content = run(["inspect", &folders.output("out.glb")]);
+    assert!(text(&content.stdout).contains("grid      none"), "{}", text(&content.stdout));
+    assert_eq!(json_of(&run(["inspect", &folders.output("out.glb"), "--json"]))["grid"], Value::Null);
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use vlm_bake::bake::{Bake, bake};
+use vlm_bake::grid::GridOptions;
 use vlm_bake::options::{BakeOptions, Preset};
 use vlm_bake::picture::write_png;
 use vlm_bake::progress::Progress;
@@ -35,9 +36,18 @@ pub struct BakeArgs {
     /// Number of lights for the whole scene [default: by preset and number of triangles]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     lights: Option<u32>,
-    /// Edge of a grid cell in metres [default: a 24th of the scene]
+    /// Edge of the grid's coarsest cells in metres [default: a 16th of the scene]
     #[arg(long, value_name = "METRES", value_parser = positive)]
     cell: Option<f32>,
+    /// About how many probes the grid has, within limits of their spacing; 0 for no grid [default: by preset and lights]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
+    probes: Option<u32>,
+    /// Directions traced from each probe; more have less noise [default: by preset]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    rays: Option<u32>,
+    /// Most near lights of a probe, whose form factor every pixel evaluates; 0 for the fastest frame [default: by preset]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=4096))]
+    near: Option<u32>,
     /// Write what was made as JSON
     #[arg(long, value_name = "FILE.json")]
     report: Option<PathBuf>,
@@ -122,7 +132,12 @@ fn load_scene(file: &GltfFile, bars: &Bars) -> Result<Scene, CliError> {
 fn options(args: &BakeArgs, scene: &Scene) -> BakeOptions {
     let mut options = BakeOptions::preset(args.preset.into(), scene.triangles.len());
     options.lights = args.lights.unwrap_or(options.lights);
-    options.grid.cell_size = args.cell;
+    options.grid = GridOptions {
+        probes: args.probes.unwrap_or(options.grid.probes),
+        rays: args.rays.unwrap_or(options.grid.rays),
+        near: args.near.unwrap_or(options.grid.near),
+        cell_size: args.cell,
+    };
     options
 }
 

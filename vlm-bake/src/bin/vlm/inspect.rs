@@ -6,10 +6,11 @@ use std::path::PathBuf;
 use clap::Args;
 use glam::Vec3;
 use serde::Serialize;
-use vlm_format::{Grid, Settings, VlmAsset, read_vlm_unchecked};
+use vlm_format::{Settings, VlmAsset, read_vlm_unchecked};
 
 use crate::error::CliError;
 use crate::input::open;
+use crate::inspect_grid::GridContent;
 use crate::output::{print, print_json};
 
 /// Flags of `vlm inspect`.
@@ -54,17 +55,6 @@ struct VlmContent {
     lights: u32,
     vertices: u32,
     authored: bool,
-}
-
-#[derive(Serialize)]
-struct GridContent {
-    cell_size_m: f32,
-    dimensions: [u32; 3],
-    leaves: usize,
-    probes: usize,
-    near_entries: usize,
-    far_entries: u32,
-    bytes: usize,
 }
 
 /// Runs the command. Stale files may be looked into; that is what `vlm check` is for.
@@ -128,8 +118,9 @@ impl Content {
                 self.partly_tagged_primitives
             ),
         ];
-        lines.push(self.grid.as_ref().map_or_else(|| "grid      none".to_owned(), GridContent::line));
         lines.extend(self.vlms.iter().map(VlmContent::line));
+        lines
+            .extend(self.grid.as_ref().map_or_else(|| vec!["grid      none".to_owned()], GridContent::lines));
         lines
     }
 }
@@ -148,32 +139,5 @@ impl VlmContent {
     fn line(&self) -> String {
         let origin = if self.authored { "authored" } else { "derived" };
         format!("vlm       {} (node {}): {} lights, {origin}", self.id, self.node, self.lights)
-    }
-}
-
-impl GridContent {
-    fn of(grid: &Grid) -> Self {
-        Self {
-            cell_size_m: grid.cell_size,
-            dimensions: grid.dimensions,
-            leaves: grid.leaves.len().saturating_sub(1),
-            probes: grid.probes.len(),
-            near_entries: grid.near.len(),
-            far_entries: grid.row_starts.last().copied().unwrap_or(0),
-            bytes: grid.byte_len(),
-        }
-    }
-
-    fn line(&self) -> String {
-        let [x, y, z] = self.dimensions;
-        format!(
-            "grid      {x} x {y} x {z} cells of {} m, {} leaves, {} probes, {} near lights, {} far, {:.1} kB",
-            self.cell_size_m,
-            self.leaves,
-            self.probes,
-            self.near_entries,
-            self.far_entries,
-            self.bytes as f64 / 1e3
-        )
     }
 }

@@ -11,6 +11,7 @@ mod progress;
 mod bake;
 mod check;
 mod inspect;
+mod inspect_grid;
 mod strip;
 mod render;
 
