@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use maud::{Markup, html};
-use vlm_format::VlmAsset;
+use vlm_format::{Grid, VlmAsset};
 
 use super::checked::Checked;
 use super::colour::{css, encode, of_tag};
@@ -268,18 +268,19 @@ fn share(part: u64, whole: u64) -> f64 {
 }
 
 /// Four bytes a number, as `vlm-format` writes them.
-fn sizes(asset: &VlmAsset) -> [(&'static str, u64); 4] {
+fn sizes(asset: &VlmAsset) -> Vec<(String, u64)> {
     let numbers = |vectors: usize, integers: usize| 4 * (3 * vectors + integers) as u64;
     let lights = numbers(asset.positions.len() + asset.triangles.len(), 0);
     let colours = numbers(asset.albedo.len() + asset.emission.len(), asset.tags.len());
     let samples = numbers(3 * asset.samples.len(), asset.sample_starts.len());
-    let grid = asset.grid.as_ref().map_or(0, |grid| grid.byte_len() as u64);
-    [
-        ("lights: geometry", lights),
-        ("lights: colours and tags", colours),
-        ("samples", samples),
-        ("grid", grid),
-    ]
+    let mut parts = vec![
+        ("lights: geometry".to_owned(), lights),
+        ("lights: colours and tags".to_owned(), colours),
+        ("samples".to_owned(), samples),
+    ];
+    let grid = asset.grid.as_ref().map(Grid::sizes).into_iter().flatten();
+    parts.extend(grid.map(|(array, bytes)| (format!("grid: {array}"), bytes as u64)));
+    parts
 }
 
 /// Seconds by stage, in alphabetical order, as bars.

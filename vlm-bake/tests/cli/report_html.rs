@@ -224,6 +224,15 @@ fn two_sided_sheets_are_listed_with_their_reason_and_cost() {
 }
 
 #[test]
+fn sizes_are_listed_by_array_of_the_grid() {
+    let rows = |flags: &[&str]| {
+        let page = page_of(&Document::room(), &[&["--lights", "60"], flags].concat());
+        section(&page, "size").matches("grid: ").count()
+    };
+    assert_eq!((rows(&[]), rows(&["--probes", "0"])), (10, 0));
+}
+
+#[test]
 fn a_scene_of_authored_lights_alone_has_a_page() {
     let mut document = Document::room();
     document.json["nodes"][0]["extras"] = json!({ "vlm": { "exclude": true } });
