@@ -96,11 +96,36 @@ fn broken_extensions_do_not_conform() {
         ("/samples/starts", json!(null)),
         ("/grid/cellSize", json!(0)),
         ("/grid/dimensions", json!([1, 2])),
+        ("/grid/surfaceProbes", json!(-1)),
+        ("/grid/sceneDigest", json!("xyz")),
         ("/data/bufferView", json!("0")),
     ] {
         let mut broken = root.clone();
         *broken.pointer_mut(pointer).unwrap() = value;
         assert!(!schema.is_valid(&broken), "a wrong {pointer} conforms");
+    }
+}
+
+#[test]
+fn every_array_of_the_grid_is_described() {
+    let file = room();
+    let asset = quads(&file);
+    let json = written(&file, &asset);
+    let root = &json["extensions"][EXTENSION];
+    let schema = schema("glTF");
+    for (array, bytes) in asset.grid.as_ref().unwrap().sizes() {
+        let accessor = root["grid"][array]["accessor"].as_u64().unwrap() as usize;
+        let accessor = &json["accessors"][accessor];
+        let width = if accessor["type"] == "VEC4" { 16 } else { 4 };
+        assert_eq!(accessor["count"].as_u64().unwrap() as usize * width, bytes, "{array}");
+        let mut broken = root.clone();
+        broken["grid"][array] = json!(3);
+        assert!(!schema.is_valid(&broken), "a wrong {array} conforms");
+    }
+    for required in ["cells", "leaves", "nearStarts", "rowStarts", "surfaceProbes", "sceneDigest"] {
+        let mut broken = root.clone();
+        broken["grid"].as_object_mut().unwrap().remove(required);
+        assert!(!schema.is_valid(&broken), "a grid without {required} conforms");
     }
 }
 
