@@ -212,11 +212,3 @@ pub fn table(rows: &[Row]) -> String {
     }
     text
 }
-
-/// Truths of a scene's file, cached in a folder.
-///
-/// # Errors
-/// If the folder cannot be made.
-pub fn truths(cache: &Path, bytes: &[u8]) -> Result<Truths, TruthError> {
-    Truths::new(cache, bytes)
-}

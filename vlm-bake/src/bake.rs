@@ -178,7 +178,16 @@ fn static_grid(
     let trace = TraceScene::new(scene);
     let gains: Vec<f32> = baked.iter().map(BakedLight::surface_gain).collect();
     let shares: Vec<f32> = baked.iter().flat_map(|l| &l.samples).map(|s| s.share).collect();
-    let input = GridInput { trace: &trace, stand_ins, lights: &lights, gains: &gains, shares: &shares };
+    let light_of_sample: Vec<u32> =
+        baked.iter().zip(0..).flat_map(|(light, number)| light.samples.iter().map(move |_| number)).collect();
+    let input = GridInput {
+        trace: &trace,
+        stand_ins,
+        lights: &lights,
+        light_of_sample: &light_of_sample,
+        gains: &gains,
+        shares: &shares,
+    };
     grid(&input, options, progress)
 }
 

@@ -23,9 +23,6 @@ pub const LEAST_COSINE: f64 = 0.9;
 /// the far side of a hollow; lower values give the surface beside a sharp edge to the light across it.
 const STRAIGHT_SHARE: f64 = 3.0;
 
-/// A light of another region may stand in for surface whose normal is at most this far (cosine) from its own.
-const FACING_COSINE: f64 = 0.5;
-
 /// A triangle that emits, and what it came from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
@@ -65,8 +62,6 @@ pub struct Correspondence<'a> {
     /// Longest edges.
     sizes: Vec<f64>,
     regions: GroupedBvh,
-    /// All lights that stand for something, as group 0.
-    all: GroupedBvh,
     reach: f64,
 }
 
@@ -85,7 +80,6 @@ impl<'a> Correspondence<'a> {
             normals: lights.iter().map(Light::normal).collect(),
             sizes: lights.iter().map(Light::longest_edge).collect(),
             regions: GroupedBvh::new(&positions, &triangles, region, patches.regions.len() + 1),
-            all: GroupedBvh::new(&positions, &triangles, |l| u32::from(!emits(l)), 2),
             reach: ground.reach,
         }
     }
@@ -108,20 +102,12 @@ impl<'a> Correspondence<'a> {
         along(-point.normal).or_else(|| along(point.normal)).or(Some(near.triangle))
     }
 
-    /// The nearest light of a point's region and side, whichever way it looks: it speaks for surface that no light stands for.
+    /// The nearest light of a point's region and side, whichever way it looks: for surface that no light stands for.
     #[must_use]
     pub fn nearest_in_region(&self, point: &SurfacePoint) -> Option<u32> {
         let own = self.patches.triangle_region[point.triangle as usize];
         let alike = |l: u32| self.sides[l as usize] == point.back;
         self.regions.closest(own, point.inner, self.reach, alike).map(|near| near.triangle)
-    }
-
-    /// The nearest light of a point's region and side, whichever way it looks, else of all that look its way: for surface that no light stands for.
-    #[must_use]
-    pub fn nearest_of(&self, point: &SurfacePoint) -> Option<u32> {
-        let facing = |l: u32| self.normals[l as usize].dot(point.normal) > FACING_COSINE;
-        let any = || Some(self.all.closest(0, point.inner, self.reach, facing)?.triangle);
-        self.nearest_in_region(point).or_else(any)
     }
 
     /// The light of each point.

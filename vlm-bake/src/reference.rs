@@ -7,7 +7,7 @@
 
 use std::f32::consts::PI;
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 
 use crate::progress::Progress;
@@ -119,10 +119,14 @@ fn random_shift(seed: u64) -> (u32, u32) {
     (bits as u32, (bits >> 32) as u32)
 }
 
-/// `count` directions around +z with density `cos(theta) / pi`, stratified; `seed` chooses them.
-pub fn cosine_directions(count: u32, seed: u64) -> impl Iterator<Item = Vec3> {
-    let shift = random_shift(seed);
-    (0..count).map(move |i| cosine_direction(shifted_hammersley(i, count, shift)))
+/// Of `count` directions around a surface's shading normal with density `cos(theta) / pi`, stratified, those above the surface itself; `seed`
+/// chooses them.
+pub fn directions_above(surface: &SurfacePoint, count: u32, seed: u64) -> impl Iterator<Item = Vec3> {
+    let (tangent, bitangent) = surface.normal.any_orthonormal_pair();
+    let frame = Mat3::from_cols(tangent, bitangent, surface.normal);
+    let (shift, geometric_normal) = (random_shift(seed), surface.geometric_normal);
+    let directions = (0..count).map(move |i| frame * cosine_direction(shifted_hammersley(i, count, shift)));
+    directions.filter(move |direction| direction.dot(geometric_normal) > 0.0)
 }
 
 /// The `i`-th of `count` points of the unit square (Hammersley 1960): stratified in both coordinates at every scale,

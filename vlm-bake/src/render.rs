@@ -37,7 +37,7 @@ pub enum Method {
     Reference,
     /// The exact form factor of every light at every pixel; no occlusion.
     Brute,
-    /// The lights of each point's grid cell; every light without a grid or with few lights.
+    /// By the static grid; every light where there is no grid or there are few lights.
     #[default]
     Vlm,
 }
@@ -203,12 +203,10 @@ pub fn gather_brute(
     gbuffer: &GBuffer,
     progress: &dyn Progress,
 ) -> Result<(Vec<Vec3>, RenderStats), RenderError> {
-    let lit = LitScene::new(trace, asset)?;
-    let all: Vec<u32> = (0..lit.lights.len() as u32).collect();
-    Ok(lit.gather_lists(gbuffer, progress, |_| &all))
+    Ok(LitScene::new(trace, asset)?.gather_all(gbuffer, progress))
 }
 
-/// Phases 1 and 2 with the lights of each point's grid cell; every light without a grid or with few lights.
+/// Phases 1 and 2 by the static grid; with every light where there is no grid or there are few lights.
 ///
 /// # Errors
 /// [`RenderError::UnknownNode`] if a VLM belongs to a node that the scene does not have.
@@ -273,44 +271,16 @@ impl LitScene {
             row.iter().map(at)
         });
         let gathered: Vec<Gathered> = gathered.collect();
-        let seconds = PhaseSeconds { inject: self.inject_seconds, gather: start.elapsed().as_secs_f64() };
-        let pairs_evaluated = gathered.iter().map(|g| g.pairs).sum();
-        let stats = RenderStats { seconds, pairs_evaluated, lights: self.lights.len() as u32 };
+        let stats = self.stats(gathered.iter().map(|g| g.pairs).sum(), start);
         (gathered.iter().map(|g| g.irradiance).collect(), stats)
     }
 
-    /// Phase 2 at every pixel with the list of lights that its position has: pixels of a list together.
-    pub fn gather_lists<'l>(
-        &self,
-        gbuffer: &GBuffer,
-        progress: &dyn Progress,
-        list_at: impl Fn(Vec3) -> &'l [u32] + Sync,
-    ) -> (Vec<Vec3>, RenderStats) {
-        let start = Instant::now();
-        let with_list = |(pixel, point): (usize, &Option<SurfacePoint>)| {
-            point.as_ref().map(|point| (list_at(point.position), pixel, self.receiver(point)))
-        };
-        let mut all: Vec<_> = gbuffer.points.par_iter().enumerate().filter_map(with_list).collect();
-        all.par_sort_unstable_by_key(|&(list, pixel, _)| (list.as_ptr(), pixel));
-        let by_list = all.chunk_by(|(a, ..), (b, ..)| std::ptr::eq(*a, *b));
-        let tasks: Vec<_> = by_list.flat_map(|pixels| pixels.chunks(PIXELS_TOGETHER)).collect();
-        progress.begin("gather", tasks.len() as u64);
-        let gather = |pixels: &&[(&[u32], usize, Receiver)]| {
-            progress.advance(1);
-            let receivers: Vec<Receiver> = pixels.iter().map(|(.., receiver)| *receiver).collect();
-            let list = pixels.first().map_or(&[] as &[u32], |(list, ..)| *list);
-            gather_together(&self.lights, &self.radiosity, list, &receivers)
-        };
-        let gathered: Vec<Vec<Gathered>> = tasks.par_iter().map(gather).collect();
-        let mut irradiance = vec![Vec3::ZERO; gbuffer.points.len()];
-        let mut pairs_evaluated = 0;
-        for ((_, pixel, _), gathered) in all.iter().zip(gathered.iter().flatten()) {
-            irradiance[*pixel] = gathered.irradiance;
-            pairs_evaluated += gathered.pairs;
-        }
-        let seconds = PhaseSeconds { inject: self.inject_seconds, gather: start.elapsed().as_secs_f64() };
-        let stats = RenderStats { seconds, pairs_evaluated, lights: self.lights.len() as u32 };
-        (irradiance, stats)
+    /// Phase 2 at every pixel with every light.
+    pub fn gather_all(&self, gbuffer: &GBuffer, progress: &dyn Progress) -> (Vec<Vec3>, RenderStats) {
+        let all: Vec<u32> = (0..self.lights.len() as u32).collect();
+        let gather =
+            |_, receivers: &[Receiver]| gather_together(&self.lights, &self.radiosity, &all, receivers);
+        self.gather_grouped(gbuffer, progress, |_| Some(0), gather, Instant::now())
     }
 
     /// Phase 2 at every pixel by the static grid: far light is refreshed, then pixels of a leaf are gathered together.
@@ -324,19 +294,32 @@ impl LitScene {
         let radiosity = source_radiosity(grid, &self.lights, &self.reflected);
         let far = refresh(grid, &far_sources(&self.lights), &radiosity);
         let frame = Frame { grid, lights: &self.lights, radiosity: &self.radiosity, far: &far };
-        let with_leaf = |(pixel, point): (usize, &Option<SurfacePoint>)| {
+        let gather = |leaf, receivers: &[Receiver]| frame.gather_together(leaf, receivers);
+        self.gather_grouped(gbuffer, progress, |position| leaf_at(grid, position), gather, start)
+    }
+
+    /// Gathers pixels of one group together; those without a group get nothing. Time counts from `start`.
+    fn gather_grouped(
+        &self,
+        gbuffer: &GBuffer,
+        progress: &dyn Progress,
+        group_at: impl Fn(Vec3) -> Option<u32> + Sync,
+        gather: impl Fn(u32, &[Receiver]) -> Vec<Gathered> + Sync,
+        start: Instant,
+    ) -> (Vec<Vec3>, RenderStats) {
+        let with_group = |(pixel, point): (usize, &Option<SurfacePoint>)| {
             let point = point.as_ref()?;
-            Some((leaf_at(grid, point.position)?, pixel, self.receiver(point)))
+            Some((group_at(point.position)?, pixel, self.receiver(point)))
         };
-        let mut all: Vec<_> = gbuffer.points.par_iter().enumerate().filter_map(with_leaf).collect();
-        all.par_sort_unstable_by_key(|&(leaf, pixel, _)| (leaf, pixel));
-        let tasks: Vec<_> =
-            all.chunk_by(|(a, ..), (b, ..)| a == b).flat_map(|p| p.chunks(PIXELS_TOGETHER)).collect();
+        let mut all: Vec<_> = gbuffer.points.par_iter().enumerate().filter_map(with_group).collect();
+        all.par_sort_unstable_by_key(|&(group, pixel, _)| (group, pixel));
+        let groups = all.chunk_by(|(a, ..), (b, ..)| a == b);
+        let tasks: Vec<_> = groups.flat_map(|pixels| pixels.chunks(PIXELS_TOGETHER)).collect();
         progress.begin("gather", tasks.len() as u64);
         let gather = |pixels: &&[(u32, usize, Receiver)]| {
             progress.advance(1);
             let receivers: Vec<Receiver> = pixels.iter().map(|(.., receiver)| *receiver).collect();
-            pixels.first().map_or_else(Vec::new, |(leaf, ..)| frame.gather_together(*leaf, &receivers))
+            pixels.first().map_or_else(Vec::new, |&(group, ..)| gather(group, &receivers))
         };
         let gathered: Vec<Vec<Gathered>> = tasks.par_iter().map(gather).collect();
         let mut irradiance = vec![Vec3::ZERO; gbuffer.points.len()];
@@ -345,9 +328,12 @@ impl LitScene {
             irradiance[*pixel] = gathered.irradiance;
             pairs_evaluated += gathered.pairs;
         }
+        (irradiance, self.stats(pairs_evaluated, start))
+    }
+
+    fn stats(&self, pairs_evaluated: u64, start: Instant) -> RenderStats {
         let seconds = PhaseSeconds { inject: self.inject_seconds, gather: start.elapsed().as_secs_f64() };
-        let stats = RenderStats { seconds, pairs_evaluated, lights: self.lights.len() as u32 };
-        (irradiance, stats)
+        RenderStats { seconds, pairs_evaluated, lights: self.lights.len() as u32 }
     }
 
     /// A surface point as phase 2 sees it.

@@ -49,20 +49,31 @@ impl SurfacePoint {
 #[must_use]
 pub fn spread_points(patches: &Patches, count: usize) -> Vec<SurfacePoint> {
     let areas: Vec<f64> = (0..patches.triangles.len()).into_par_iter().map(|t| patches.area(t)).collect();
-    let step = areas.iter().sum::<f64>() / count.max(1) as f64;
+    let (drawn, step) = area_steps(&areas, count);
     let mut points = Vec::with_capacity(count + count / 8);
+    for triangle in drawn {
+        place(patches, triangle as usize, points.len() as u64, step, &mut points);
+    }
+    points
+}
+
+/// The triangle at each of `count` equal steps of the area summed over triangles, and the step; none without area.
+#[must_use]
+pub fn area_steps(areas: &[f64], count: usize) -> (Vec<u32>, f64) {
+    let step = areas.iter().sum::<f64>() / count.max(1) as f64;
+    let mut drawn = Vec::with_capacity(count + 1);
     if step <= 0.0 {
-        return points;
+        return (drawn, step);
     }
     let mut ahead = 0.5 * step;
-    for (t, area) in areas.iter().enumerate() {
+    for (triangle, area) in areas.iter().enumerate() {
         while ahead < *area {
-            place(patches, t, points.len() as u64, step, &mut points);
+            drawn.push(triangle as u32);
             ahead += step;
         }
         ahead -= area;
     }
-    points
+    (drawn, step)
 }
 
 /// Adds one point of a triangle; on a two-sided surface one for each side.

@@ -36,16 +36,15 @@ pub fn radiosity(lights: &LightSet, reflected: &[Vec3]) -> Vec<Vec3> {
 pub fn source_radiosity(grid: &Grid, lights: &LightSet, reflected: &[Vec3]) -> Vec<Vec3> {
     let mut sources = vec![Vec3::ZERO; lights.samples.len() + lights.len()];
     let (of_samples, of_lights) = sources.split_at_mut(lights.samples.len());
-    for (light, of_light) in of_lights.iter_mut().enumerate() {
-        let Some(range) = lights.sample_range(light) else { continue };
+    let radiosity = radiosity(lights, reflected);
+    for (light, (of_light, radiosity)) in of_lights.iter_mut().zip(radiosity).enumerate() {
         let gain = grid.surface_gains.get(light).copied().unwrap_or(0.0);
+        *of_light = radiosity * gain;
         let emission = lights.emission.get(light).copied().unwrap_or_default();
-        for sample in range {
+        for sample in lights.sample_range(light).unwrap_or_default() {
             let share = grid.sample_shares.get(sample).copied().unwrap_or(1.0);
-            let own = (reflected.get(sample).copied().unwrap_or_default() / share + emission) * gain;
-            *of_light += own * share;
-            if let Some(of_sample) = of_samples.get_mut(sample) {
-                *of_sample = own;
+            if let Some((of_sample, reflected)) = of_samples.get_mut(sample).zip(reflected.get(sample)) {
+                *of_sample = (*reflected / share + emission) * gain;
             }
         }
     }

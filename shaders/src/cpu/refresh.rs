@@ -29,10 +29,10 @@ pub struct FarSource {
 #[must_use]
 pub fn far_sources(lights: &LightSet) -> Vec<FarSource> {
     let of_sample = |s: &Sample| FarSource { centroid: s.position, normal: s.normal, ..FarSource::default() };
-    let of_light = |light: &LightGeometry| {
-        let [a, b, c] = light.corners();
-        let centroid = (a + b + c) / 3.0;
-        FarSource { centroid, normal: light.normal.normalize_or_zero(), ..FarSource::default() }
+    let of_light = |light: &LightGeometry| FarSource {
+        centroid: light.centroid(),
+        normal: light.normal.normalize_or_zero(),
+        ..FarSource::default()
     };
     lights.samples.iter().map(of_sample).chain(lights.geometry.iter().map(of_light)).collect()
 }

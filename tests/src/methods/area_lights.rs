@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use vlm_bake::render::{RenderStats, world_lights};
 use vlm_bake::shade::TraceScene;
-use vlm_format::{Sample, VlmAsset};
+use vlm_format::Sample;
 use vlm_shaders::cpu::form_factor::LightGeometry;
 use vlm_shaders::cpu::upload::LightSet;
 
@@ -52,12 +52,6 @@ impl AreaLights {
             rays: self.inject_rays,
         }
     }
-}
-
-/// Bytes of an asset's grid.
-#[must_use]
-pub fn grid_bytes(asset: &VlmAsset) -> u64 {
-    asset.grid.as_ref().map_or(0, |grid| grid.byte_len() as u64)
 }
 
 /// The rays that [`TraceScene::direct_irradiance`] traces: one for each light in front of the surface.

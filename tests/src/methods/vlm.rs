@@ -7,7 +7,7 @@ use vlm_bake::progress::Silent;
 use vlm_bake::render::gather_by_grid;
 
 use super::Entry;
-use super::area_lights::{AreaLights, grid_bytes};
+use super::area_lights::AreaLights;
 use crate::method::{Baked, Cost, Method, MethodError, Picture, Prepared, Stage, View};
 
 /// The method's line in the table.
@@ -77,9 +77,10 @@ impl Prepared for PreparedVlm {
 
     fn cost(&self) -> Cost {
         let baked = &self.lights.baked;
+        let grid = baked.asset.grid.as_ref();
         Cost {
             prepare_seconds: baked.lights_seconds + baked.grid_seconds,
-            bytes: self.lights.bytes() + grid_bytes(&baked.asset),
+            bytes: self.lights.bytes() + grid.map_or(0, |grid| grid.byte_len() as u64),
         }
     }
 

@@ -19,7 +19,7 @@ mod tree;
 pub use stand_in::StandIns;
 pub use transport::transport;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, IVec3, Vec3};
 use vlm_format::{Grid, NearLight, Probe, RowWriter};
 use vlm_shaders::cpu::upload::LightSet;
 
@@ -51,6 +51,8 @@ pub struct GridInput<'a> {
     pub stand_ins: &'a StandIns,
     /// The lights in world space.
     pub lights: &'a LightSet,
+    /// The light of each sample.
+    pub light_of_sample: &'a [u32],
     /// Radiosity of the surface that each light stands for over the light's own.
     pub gains: &'a [f32],
     /// The share of its light's area that each sample speaks for.
@@ -84,6 +86,12 @@ pub fn grid(input: &GridInput, options: &GridOptions, progress: &dyn Progress) -
     grid.sample_shares = input.shares.to_vec();
     grid.surface_gains = input.gains.to_vec();
     Some(grid)
+}
+
+/// The cells of the box between two, both included, x fastest.
+fn cells_between(low: IVec3, high: IVec3) -> impl Iterator<Item = IVec3> {
+    let rows = (low.z..=high.z).flat_map(move |z| (low.y..=high.y).map(move |y| (y, z)));
+    rows.flat_map(move |(y, z)| (low.x..=high.x).map(move |x| IVec3::new(x, y, z)))
 }
 
 /// Surface that no probe reaches, behind walls, steps and edges, gets probes of its own in as many rounds, at these shares of their

@@ -6,7 +6,7 @@ use vlm_shaders::cpu::form_factor::{form_factor, is_behind};
 use vlm_shaders::cpu::upload::LightSet;
 
 use super::pool::Place;
-use super::transport::{Row, light_of_sample};
+use super::transport::Row;
 use super::{GridInput, GridOptions};
 
 /// A light is near where its form factor may change over the probe's reach by more than this share of all that the probe gets. Lower values make
@@ -25,17 +25,8 @@ pub fn split(
     rows: Vec<Row>,
     options: &GridOptions,
 ) -> (Vec<NearRow>, Vec<Row>) {
-    let light_of_sample = light_of_sample(input.lights);
-    let splitter = Splitter { lights: input.lights, gains: input.gains, light_of_sample: &light_of_sample };
-    let part = |(i, row)| splitter.split(&places[i], &probes[i], row, options.near as usize);
+    let part = |(i, row)| input.split(&places[i], &probes[i], row, options.near as usize);
     rows.into_par_iter().enumerate().map(part).unzip()
-}
-
-struct Splitter<'a> {
-    lights: &'a LightSet,
-    /// Radiosity of each light's surface over its own.
-    gains: &'a [f32],
-    light_of_sample: &'a [u32],
 }
 
 /// A light of a row that may become near.
@@ -48,7 +39,7 @@ struct Candidate {
     form_factor: f32,
 }
 
-impl Splitter<'_> {
+impl GridInput<'_> {
     fn split(&self, place: &Place, probe: &Probe, mut row: Row, most: usize) -> (NearRow, Row) {
         let mut near: NearRow = Vec::new();
         let mut kept: Vec<(u32, f32)> = Vec::new();
@@ -116,8 +107,7 @@ fn seen(lights: &LightSet, place: &Place, light: u32) -> Option<f32> {
 
 /// By what share a light's form factor may change over a probe's reach, beyond what a slope follows: the square of reach over distance.
 fn change(lights: &LightSet, probe: &Probe, light: u32) -> f32 {
-    let corners = lights.geometry[light as usize].corners();
-    let centroid = (corners[0] + corners[1] + corners[2]) / 3.0;
+    let centroid = lights.geometry[light as usize].centroid();
     let reach = probe.reach.iter().copied().fold(0.0, f32::max);
     (reach * reach / centroid.distance_squared(probe.position)).min(1.0)
 }

@@ -1,11 +1,12 @@
 //! Places where probes may be: spread evenly over the surface that free space sees.
 
-use glam::{Mat3, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::bvh::Hit;
-use crate::reference::cosine_directions;
+use crate::reference::directions_above;
 use crate::shade::{SurfacePoint, TraceScene};
+use crate::surface::{area_steps, uniform_barycentric};
 use crate::topology::area;
 
 /// Places per probe. Higher values place probes more evenly and find smaller surfaces; each takes [`LOOKS`] rays.
@@ -41,21 +42,9 @@ pub fn pool(trace: &TraceScene, probes: u32) -> Vec<Place> {
         .map(|t| if trace.lit_sides(t as u32)[0] { area(corners(t)) } else { 0.0 })
         .collect();
     let count = probes.saturating_mul(PLACES_PER_PROBE).max(LEAST_PLACES);
-    let step = areas.iter().sum::<f64>() / f64::from(count);
-    if step <= 0.0 {
-        return Vec::new();
-    }
-    let mut ahead = 0.5 * step;
-    let mut drawn = Vec::with_capacity(count as usize);
-    for (t, area) in areas.iter().enumerate() {
-        while ahead < *area {
-            drawn.push(t as u32);
-            ahead += step;
-        }
-        ahead -= area;
-    }
+    let (drawn, step) = area_steps(&areas, count as usize);
     let looked = drawn.par_iter().enumerate().flat_map_iter(|(i, &triangle)| {
-        let barycentric = crate::surface::uniform_barycentric(i as u64);
+        let barycentric = uniform_barycentric(i as u64);
         let [front, back] = trace.lit_sides(triangle);
         let sides = [(front, true), (back, false)].into_iter().filter(|(lit, _)| *lit);
         sides.filter_map(move |(_, front)| {
@@ -70,14 +59,8 @@ pub fn pool(trace: &TraceScene, probes: u32) -> Vec<Place> {
 /// Looks around from a place; `None` inside of something.
 fn look(trace: &TraceScene, surface: SurfacePoint, area: f32, seed: u64) -> Option<Place> {
     let origin = trace.bvh.leave(surface.position, surface.geometric_normal);
-    let (tangent, bitangent) = surface.normal.any_orthonormal_pair();
     let (mut backs, mut inverse) = (0.0, 0.0);
-    let frame = Mat3::from_cols(tangent, bitangent, surface.normal);
-    for local in cosine_directions(LOOKS, seed) {
-        let direction = frame * local;
-        if direction.dot(surface.geometric_normal) <= 0.0 {
-            continue;
-        }
+    for direction in directions_above(&surface, LOOKS, seed) {
         if let Some(hit) = trace.path_hit(origin, direction) {
             backs += f32::from(u8::from(!trace.is_lit_side(&hit)));
             inverse += 1.0 / hit.distance.max(f32::MIN_POSITIVE);

@@ -3,6 +3,7 @@
 use glam::{DVec3, IVec3, Vec3};
 use rustc_hash::FxHashMap;
 
+use super::cells_between;
 use super::pool::Place;
 
 /// Probes are at most this share of the scene's extent apart.
@@ -110,15 +111,14 @@ impl Neighbourhood {
             let reach = Vec3::splat(distance.min(0.5 * size));
             let low = ((place.position - reach) / size).floor().as_ivec3();
             let high = ((place.position + reach) / size).floor().as_ivec3();
-            let cells = (low.z..=high.z).flat_map(|z| (low.y..=high.y).map(move |y| (y, z)));
-            let mut cells = cells.flat_map(|(y, z)| (low.x..=high.x).map(move |x| IVec3::new(x, y, z)));
             let blocks = |&(other, spacing): &(u32, f32)| {
                 let other = &pool[other as usize].surface;
                 let least = distance.min(spacing);
                 other.position.distance_squared(place.position) < least * least
                     && other.geometric_normal.dot(place.geometric_normal) > SAME_WAY
             };
-            cells.any(|cell| self.levels[level].get(&cell).is_some_and(|there| there.iter().any(blocks)))
+            cells_between(low, high)
+                .any(|cell| self.levels[level].get(&cell).is_some_and(|there| there.iter().any(blocks)))
         })
     }
 }

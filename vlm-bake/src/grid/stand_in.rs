@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use crate::correspondence::{Correspondence, Light};
 use crate::ground::Ground;
+use crate::grouped_bvh::GroupedBvh;
 use crate::samples::{BakedLight, WorldSample};
 use crate::scene::Scene;
 use crate::surface::SurfacePoint;
@@ -15,6 +16,9 @@ const CELLS_PER_LIGHT: f64 = 32.0;
 
 /// The most rows into which a triangle is divided.
 const MOST_ROWS: f64 = 64.0;
+
+/// A light of another region may stand in for surface whose normal is at most this far (cosine) from its own.
+const FACING_COSINE: f64 = 0.5;
 
 /// No sample.
 const NONE: u32 = u32::MAX;
@@ -33,7 +37,7 @@ impl StandIns {
     pub fn new(scene: &Scene, ground: &Ground, baked: &[BakedLight]) -> Self {
         let lights: Vec<Light> =
             baked.iter().map(|l| Light { corners: l.corners, region: l.region, back: l.back }).collect();
-        let near = Correspondence::new(ground, &lights, |l| !baked[l].authored);
+        let search = Search::new(ground, &lights, |l| !baked[l].authored);
         let total: f64 = lights.iter().map(Light::area).sum();
         let cell_area = total / (lights.len().max(1) as f64 * CELLS_PER_LIGHT);
         let patches = ground.patches;
@@ -44,16 +48,13 @@ impl StandIns {
             let two_sided = patches.region(t).two_sided;
             let sides: &[bool] = if two_sided { &[true, false] } else { &[true] };
             let cells = sides.iter().flat_map(|&front| (0..cells(rows)).map(move |cell| (cell, front)));
-            let light = |(cell, front)| {
+            let sample = |(cell, front)| {
                 let point = point(ground, t, corners, centre(cell, rows), front);
-                let light = near.light_of(&point).or_else(|| near.nearest_of(&point));
-                light
-                    .and_then(|l| {
-                        Some(starts[l as usize] + nearest_sample(&baked[l as usize], point.position)?)
-                    })
-                    .unwrap_or(NONE)
+                let light = search.light_of(&point)? as usize;
+                Some(starts[light] + nearest_sample(&baked[light], point.position)?)
             };
-            (scene_triangle, rows, two_sided, cells.map(light).collect::<Vec<u32>>())
+            let samples = cells.map(|cell| sample(cell).unwrap_or(NONE)).collect::<Vec<u32>>();
+            (scene_triangle, rows, two_sided, samples)
         };
         let triangles = (0..patches.triangles.len()).into_par_iter();
         let triangles = triangles.flat_map_iter(|t| patches.scene_triangles(t as u32).map(move |s| (t, s)));
@@ -76,6 +77,36 @@ impl StandIns {
         let side = if front || !two_sided { 0 } else { cells(rows) };
         let sample = self.samples.get((first + side + cell_of(barycentric, rows)) as usize);
         sample.copied().filter(|&sample| sample != NONE)
+    }
+}
+
+/// Finds a light for every place that has one anywhere near.
+struct Search<'a> {
+    correspondence: Correspondence<'a>,
+    bvh: GroupedBvh,
+    normals: Vec<DVec3>,
+    reach: f64,
+}
+
+impl<'a> Search<'a> {
+    fn new(ground: &Ground<'a>, lights: &[Light], emits: impl Fn(usize) -> bool) -> Self {
+        let positions: Vec<DVec3> = lights.iter().flat_map(|light| light.corners).collect();
+        let triangles: Vec<[u32; 3]> =
+            (0..lights.len() as u32).map(|l| [3 * l, 3 * l + 1, 3 * l + 2]).collect();
+        Self {
+            correspondence: Correspondence::new(ground, lights, &emits),
+            bvh: GroupedBvh::new(&positions, &triangles, |l| u32::from(!emits(l)), 2),
+            normals: lights.iter().map(Light::normal).collect(),
+            reach: ground.reach,
+        }
+    }
+
+    /// The light that stands for a place, else the nearest of its region, else the nearest that looks its way.
+    fn light_of(&self, point: &SurfacePoint) -> Option<u32> {
+        let facing = |l: u32| self.normals[l as usize].dot(point.normal) > FACING_COSINE;
+        let any = || Some(self.bvh.closest(0, point.inner, self.reach, facing)?.triangle);
+        let own = self.correspondence.light_of(point);
+        own.or_else(|| self.correspondence.nearest_in_region(point)).or_else(any)
     }
 }
 

@@ -1,13 +1,12 @@
 //! What share of a probe's light comes from which surface, by rays over its hemisphere.
 
-use glam::Mat3;
 use rayon::prelude::*;
 use vlm_shaders::cpu::upload::LightSet;
 
 use super::pool::Place;
 use super::{GridInput, StandIns};
 use crate::progress::Progress;
-use crate::reference::cosine_directions;
+use crate::reference::directions_above;
 use crate::shade::{SurfacePoint, TraceScene};
 
 /// Irradiance per radiosity by source, ascending by source: samples, then lights.
@@ -21,11 +20,10 @@ const WHOLE: f32 = 0.2;
 /// and its sum is the share of directions that meet surface.
 #[must_use]
 pub fn rows(input: &GridInput, places: &[Place], rays: u32, progress: &dyn Progress) -> Vec<Row> {
-    let light_of_sample = light_of_sample(input.lights);
     let row = |(i, place): (usize, &Place)| {
         progress.advance(1);
         let row = transport(input.trace, input.stand_ins, &place.surface, rays, i as u64);
-        whole_lights(input.lights, &light_of_sample, place, &row)
+        whole_lights(input, place, &row)
     };
     places.par_iter().enumerate().map(row).collect()
 }
@@ -40,14 +38,8 @@ pub fn transport(
     seed: u64,
 ) -> Row {
     let origin = trace.bvh.leave(surface.position, surface.geometric_normal);
-    let (tangent, bitangent) = surface.normal.any_orthonormal_pair();
-    let frame = Mat3::from_cols(tangent, bitangent, surface.normal);
     let mut met: Vec<u32> = Vec::with_capacity(rays as usize);
-    for local in cosine_directions(rays, seed) {
-        let direction = frame * local;
-        if direction.dot(surface.geometric_normal) <= 0.0 {
-            continue;
-        }
+    for direction in directions_above(surface, rays, seed) {
         let hit = trace.path_hit(origin, direction).filter(|hit| trace.is_lit_side(hit));
         met.extend(hit.and_then(|hit| stand_ins.sample_at(hit.triangle, hit.barycentric, hit.front)));
     }
@@ -55,24 +47,15 @@ pub fn transport(
     met.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as f32 / rays as f32)).collect()
 }
 
-/// The light of each sample.
-pub fn light_of_sample(lights: &LightSet) -> Vec<u32> {
-    let mut light_of = vec![0; lights.samples.len()];
-    for light in 0..lights.len() {
-        let own = lights.sample_range(light).and_then(|range| light_of.get_mut(range));
-        own.into_iter().flatten().for_each(|l| *l = light as u32);
-    }
-    light_of
-}
-
 /// Joins the samples of lights that seem small into the lights themselves.
-fn whole_lights(lights: &LightSet, light_of_sample: &[u32], place: &Place, row: &Row) -> Row {
-    let samples = lights.samples.len() as u32;
+fn whole_lights(input: &GridInput, place: &Place, row: &Row) -> Row {
+    let light_of = |source: u32| input.light_of_sample[source as usize];
+    let samples = input.light_of_sample.len() as u32;
     let mut joined: Row = Vec::with_capacity(row.len());
     let mut whole: Row = Vec::new();
-    for own in row.chunk_by(|a, b| light_of_sample[a.0 as usize] == light_of_sample[b.0 as usize]) {
-        let light = light_of_sample[own[0].0 as usize];
-        if own.len() > 1 && seems_small(lights, light, place) {
+    for own in row.chunk_by(|a, b| light_of(a.0) == light_of(b.0)) {
+        let light = light_of(own[0].0);
+        if own.len() > 1 && seems_small(input.lights, light, place) {
             whole.push((samples + light, own.iter().map(|(_, share)| share).sum()));
         } else {
             joined.extend_from_slice(own);
@@ -83,8 +66,6 @@ fn whole_lights(lights: &LightSet, light_of_sample: &[u32], place: &Place, row: 
 }
 
 fn seems_small(lights: &LightSet, light: u32, place: &Place) -> bool {
-    let corners = lights.geometry[light as usize].corners();
-    let centroid = (corners[0] + corners[1] + corners[2]) / 3.0;
-    let edge = (0..3).map(|i| corners[i].distance(corners[(i + 1) % 3])).fold(0.0, f32::max);
-    edge < WHOLE * centroid.distance(place.surface.position)
+    let geometry = &lights.geometry[light as usize];
+    geometry.longest_edge() < WHOLE * geometry.centroid().distance(place.surface.position)
 }

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use vlm_format::{Grid, Leaf, MOST_PROBES, Probe};
 use vlm_shaders::cpu::grid::leaf_at;
 
+use super::cells_between;
 use super::pool::Place;
 use crate::scene::Scene;
 use crate::topology::Lists;
@@ -207,10 +208,8 @@ fn scatter(
     let touched = |i: usize| {
         let (low, high) = bounds(i);
         let room = DVec3::splat(1e-3 * size);
-        let (low, high) = (cell_of(low - room), cell_of(high + room));
-        let rows = (low.z..=high.z).flat_map(move |z| (low.y..=high.y).map(move |y| (y, z)));
-        let cells = rows.flat_map(move |(y, z)| (low.x..=high.x).map(move |x| (x, y, z)));
-        cells.map(move |(x, y, z)| x as u32 + nx * (y as u32 + ny * z as u32)).collect::<Vec<u32>>()
+        let number = |cell: IVec3| cell.x as u32 + nx * (cell.y as u32 + ny * cell.z as u32);
+        cells_between(cell_of(low - room), cell_of(high + room)).map(number).collect::<Vec<u32>>()
     };
     let touched: Vec<Vec<u32>> = (0..count).into_par_iter().map(touched).collect();
     let pairs = touched.iter().zip(0..);

@@ -87,6 +87,18 @@ impl LightGeometry {
         [self.v0, self.v1, self.v2]
     }
 
+    /// The middle, metres.
+    #[must_use]
+    pub fn centroid(&self) -> Vec3 {
+        (self.v0 + self.v1 + self.v2) / 3.0
+    }
+
+    /// Length of the longest edge, metres.
+    #[must_use]
+    pub fn longest_edge(&self) -> f32 {
+        self.v1.distance(self.v2)
+    }
+
     /// Square metres.
     #[must_use]
     pub fn area(&self) -> f32 {

@@ -7,8 +7,9 @@ use clap::Args;
 use vlm_bake::options::{BakeOptions, Preset};
 use vlm_bake::scene::{LoadOptions, load};
 use vlm_format::GltfFile;
-use vlm_tests::breakdown::{BreakdownOptions, measure, table, truths};
+use vlm_tests::breakdown::{BreakdownOptions, measure, table};
 use vlm_tests::pareto::scene;
+use vlm_tests::truth::Truths;
 
 use crate::output::make_folder;
 
@@ -64,7 +65,7 @@ pub fn run(args: &BreakdownArgs) -> Result<(), Box<dyn Error>> {
         let mut cameras = scene.cameras.clone();
         cameras.extend(scene::more_cameras(name));
         cameras.retain(|camera| camera.name.contains(&args.camera));
-        let truths = truths(&args.cache, &std::fs::read(&path)?)?;
+        let truths = Truths::new(&args.cache, &std::fs::read(&path)?)?;
         let options = BreakdownOptions {
             size: scene::default_size(name),
             spp: args.spp,
