@@ -180,7 +180,9 @@ fn static_grid(
     let shares: Vec<f32> = baked.iter().flat_map(|l| &l.samples).map(|s| s.share).collect();
     let light_of_sample: Vec<u32> =
         baked.iter().zip(0..).flat_map(|(light, number)| light.samples.iter().map(move |_| number)).collect();
+    let made: Vec<u32> = baked.iter().zip(0..).filter(|(light, _)| light.authored).map(|(_, l)| l).collect();
     let input = GridInput {
+        made: &made,
         trace: &trace,
         stand_ins,
         lights: &lights,

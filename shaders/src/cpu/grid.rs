@@ -10,7 +10,7 @@ const DEEPEST: u32 = 24;
 
 /// Weights of probes that sum to this leave nothing to probes that do not reach the point. Higher values leak more at the ends of
 /// reaches, lower ones make them sharper.
-const FIRM: f32 = 1e-3;
+const FIRM: f32 = 0.05;
 
 /// The leaf that holds `x`; `None` outside the grid and where nothing is stored.
 #[must_use]

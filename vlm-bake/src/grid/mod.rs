@@ -6,8 +6,9 @@
 //! evaluates their form factor at each pixel, times the share of it that the probes see. All others are *far*: the frame sums them once per
 //! probe, and pixels blend their probes.
 //!
-//! Steps: `stand_in -> pool -> spacing -> reach -> transport -> near -> tree`.
+//! Steps: `stand_in -> pool -> spacing -> reach -> transport, made_lights -> near -> tree`.
 
+mod made_lights;
 mod near;
 mod pool;
 mod reach;
@@ -57,6 +58,8 @@ pub struct GridInput<'a> {
     pub gains: &'a [f32],
     /// The share of its light's area that each sample speaks for.
     pub shares: &'a [f32],
+    /// The lights that artists made.
+    pub made: &'a [u32],
 }
 
 /// Builds the grid; `None` without lights or without surface.

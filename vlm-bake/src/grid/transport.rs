@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use vlm_shaders::cpu::upload::LightSet;
 
 use super::pool::Place;
-use super::{GridInput, StandIns};
+use super::{GridInput, StandIns, made_lights};
 use crate::progress::Progress;
 use crate::reference::directions_above;
 use crate::shade::{SurfacePoint, TraceScene};
@@ -20,10 +20,13 @@ const WHOLE: f32 = 0.2;
 /// and its sum is the share of directions that meet surface.
 #[must_use]
 pub fn rows(input: &GridInput, places: &[Place], rays: u32, progress: &dyn Progress) -> Vec<Row> {
+    let made = made_lights::made_lights(input);
     let row = |(i, place): (usize, &Place)| {
         progress.advance(1);
         let row = transport(input.trace, input.stand_ins, &place.surface, rays, i as u64);
-        whole_lights(input, place, &row)
+        let mut row = whole_lights(input, place, &row);
+        made_lights::add(input, &made, place, &mut row);
+        row
     };
     places.par_iter().enumerate().map(row).collect()
 }

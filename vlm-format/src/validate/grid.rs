@@ -75,6 +75,17 @@ fn leaves(grid: &Grid, issues: &mut Issues) {
         let (on_surface, end) = (pair[0].free_probes.checked_sub(pair[0].probes), pair[1].probes);
         on_surface.is_some_and(|count| count as usize <= MOST_PROBES) && pair[0].free_probes <= end
     };
+    let kinds = |pair: &[Leaf]| {
+        let is_free = |probe: &u32| *probe >= grid.surface_probes;
+        let list = |from: u32, to: u32| grid.leaf_probes.get(from as usize..to as usize).unwrap_or(&[]);
+        !list(pair[0].probes, pair[0].free_probes).iter().any(is_free)
+            && list(pair[0].free_probes, pair[1].probes).iter().all(is_free)
+    };
+    if let Some(leaf) = grid.leaves.windows(2).position(|pair| fits(pair) && !kinds(pair)) {
+        issues.check(false, Code::VlmRange, &format!("/grid/leaves/{leaf}"), || {
+            String::from("it lists a probe on surface as one in free space, or the reverse")
+        });
+    }
     if let Some(leaf) = grid.leaves.windows(2).position(|pair| !fits(pair)) {
         issues.check(false, Code::VlmOrder, &format!("/grid/leaves/{leaf}"), || {
             format!("its lists do not follow each other, or it has more than {MOST_PROBES} probes on surface")
@@ -124,6 +135,15 @@ fn rows(grid: &Grid, sources: usize, issues: &mut Issues) {
         format!("{} offsets for {} probes", grid.near_starts.len(), grid.probes.len())
     });
     check_starts(&grid.near_starts, grid.near.len(), "/grid/near_starts", issues);
+    let ascends = |range: &[u32]| {
+        let list = grid.near.get(range[0] as usize..range[1] as usize).unwrap_or(&[]);
+        list.is_sorted_by(|a, b| a.light() < b.light())
+    };
+    if let Some(probe) = grid.near_starts.windows(2).position(|range| !ascends(range)) {
+        issues.check(false, Code::VlmOrder, &format!("/grid/near/{probe}"), || {
+            String::from("the probe's near lights are not ascending")
+        });
+    }
     let fits = grid.row_starts.len() == grid.probes.len() + 1;
     issues.check(fits, Code::VlmLength, "/grid/row_starts", || {
         format!("{} offsets for {} probes", grid.row_starts.len(), grid.probes.len())
@@ -162,7 +182,7 @@ pub(super) mod tests {
             cell_size: 1.0,
             dimensions: [1, 1, 1],
             cells: vec![1],
-            leaves: vec![Leaf::default(), Leaf { probes: 1, free_probes: 1 }],
+            leaves: vec![Leaf { probes: 0, free_probes: 1 }, Leaf { probes: 1, free_probes: 1 }],
             leaf_probes: vec![0],
             near_starts: vec![0, 1],
             near: vec![NearLight::new(0, 128)],
@@ -223,6 +243,16 @@ pub(super) mod tests {
         (Code::VlmNumber, "/grid/probes/0", |a| grid(a).probes[0].reach_up = 0.0),
         (Code::VlmNumber, "/grid/probes/0", |a| grid(a).probes[0].reach_down = f32::INFINITY),
         (Code::VlmNumber, "/grid/probes/0", |a| grid(a).probes[0].reach[3] = -1.0),
+        (Code::VlmRange, "/grid/leaves/0", |a| grid(a).surface_probes = 0),
+        (Code::VlmRange, "/grid/leaves/0", |a| grid(a).leaves[0].free_probes = 0),
+        (Code::VlmOrder, "/grid/near/0", |a| {
+            grid(a).near = [1, 0].map(|light| NearLight::new(light, 128)).into();
+            grid(a).near_starts[1] = 2;
+        }),
+        (Code::VlmOrder, "/grid/near/0", |a| {
+            grid(a).near = [0, 0].map(|light| NearLight::new(light, 128)).into();
+            grid(a).near_starts[1] = 2;
+        }),
         (Code::VlmRange, "/grid/surface_probes", |a| grid(a).surface_probes = 2),
         (Code::VlmLength, "/grid/sample_shares", |a| grid(a).sample_shares.push(1.0)),
         (Code::VlmLength, "/grid/surface_gains", |a| grid(a).surface_gains.truncate(1)),
