@@ -5,7 +5,7 @@ use base64::Engine;
 use glam::Vec3;
 use serde_json::json;
 use vlm_format::{
-    GltfFile, Grid, Leaf, NearLight, Probe, RowWriter, Sample, Settings, TriangleTags, Vlm, VlmAsset,
+    GltfFile, Grid, Leaf, Probe, RowWriter, Sample, Settings, TriangleTags, Uncovered, Vlm, VlmAsset,
 };
 
 /// Two lights for each of the first two nodes with a mesh, with samples, tags, emission and a grid. The first primitive that
@@ -37,8 +37,9 @@ pub fn quads(file: &GltfFile) -> VlmAsset {
 /// Two cells of 24, one divided, over a probe on surface and one in free space.
 fn grid(lights: u32, samples: usize) -> Grid {
     let mut rows = RowWriter::default();
-    rows.push((0..lights).map(|light| (light, 200)));
-    rows.push((0..lights.min(1)).map(|light| (light, 1)));
+    rows.push(0, (0..lights).map(|light| (light, 200)));
+    rows.push(0, (0..lights.min(1)).map(|light| (light, 1)));
+    (0..lights.min(1)).for_each(|light| rows.push(0, [(light, 100)]));
     let probe = Probe {
         position: Vec3::new(0.01, 0.3, 0.01),
         row_scale: 0.001,
@@ -62,11 +63,13 @@ fn grid(lights: u32, samples: usize) -> Grid {
         ],
         leaf_probes: vec![0, 1, 0],
         near_starts: vec![0, lights.min(1), lights.min(1)],
-        near: (0..lights.min(1)).map(|light| NearLight::new(light, 128)).collect(),
+        near: (0..lights.min(1)).collect(),
+        near_form_factors: vec![0.5; lights.min(1) as usize],
         probes: vec![probe, Probe { normal: Vec3::Z, tangent: Vec3::X, ..probe }],
         surface_probes: 1,
         sample_shares: vec![1.0; samples],
         surface_gains: vec![1.0; lights as usize],
+        uncovered: vec![Uncovered { normal: Vec3::Y, reflectance: Vec3::splat(0.5), ..Uncovered::default() }],
         row_starts: rows.starts,
         rows: rows.words,
     }

@@ -7,7 +7,7 @@ use vlm_bake::bake::{Bake, bake};
 use vlm_bake::options::{BakeOptions, Preset};
 use vlm_bake::progress::Silent;
 use vlm_bake::scene::{LoadOptions, Scene, load};
-use vlm_format::{GltfFile, Grid, Leaf, NearLight, VlmAsset};
+use vlm_format::{GltfFile, Grid, Leaf, VlmAsset};
 use vlm_shaders::cpu::grid::leaf_at;
 use vlm_tests::assets;
 
@@ -134,7 +134,7 @@ fn grid_errors(grid: &Grid, asset: &VlmAsset, lights: &[Light]) -> [usize; 4] {
         grid.row(probe).map(|(_, weight)| weight as f32 * grid.probes[probe].row_scale).sum::<f32>()
     };
     let bright = (0..grid.probes.len()).filter(|&probe| sum(probe) > 1.02).count();
-    let tag = |near: &NearLight| asset.tags.get(near.light() as usize).copied().unwrap_or(0);
+    let tag = |&near: &u32| asset.tags.get(near as usize).copied().unwrap_or(0);
     let tagged = grid.near.iter().filter(|near| tag(near) != 0).count();
     [unserved, unsorted, bright, tagged]
 }

@@ -1,5 +1,7 @@
 //! The static grid where its answer is known: walls that no light passes, lights that artists made, and no seams between cells.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::path::Path;
 
 use glam::{Vec2, Vec3};
@@ -13,8 +15,6 @@ use vlm_format::{GltfFile, VlmAsset};
 use vlm_shaders::cpu::gather::{Receiver, gather};
 use vlm_shaders::cpu::gather_static::Frame;
 use vlm_shaders::cpu::grid::leaf_at;
-use vlm_shaders::cpu::inject::source_radiosity;
-use vlm_shaders::cpu::refresh::{far_sources, refresh};
 use vlm_tests::scenes::{Mesh, add, matte, point_light, quad};
 
 fn baked(scene: &Scene, lights: u32) -> VlmAsset {
@@ -32,9 +32,8 @@ fn irradiance(scene: &Scene, asset: &VlmAsset, receivers: &[Receiver]) -> (Vec<f
     let trace = TraceScene::new(scene);
     let lit = LitScene::new(&trace, asset).unwrap();
     let grid = asset.grid.as_ref().unwrap();
-    let sources = source_radiosity(grid, &lit.lights, &lit.reflected);
-    let far = refresh(grid, &far_sources(&lit.lights), &sources);
-    let frame = Frame { grid, lights: &lit.lights, radiosity: &lit.radiosity, far: &far };
+    let arrived = lit.arrived(grid);
+    let frame = Frame { grid, lights: &lit.lights, arrived: &arrived };
     let all = 0..lit.lights.len() as u32;
     let brute = |r: &Receiver| gather(&lit.lights, &lit.radiosity, all.clone(), r).irradiance.y;
     let by_grid = |r: &Receiver| frame.gather(r).irradiance.y;
@@ -160,9 +159,8 @@ fn one_receiver_gets_what_many_together_get() {
     let trace = TraceScene::new(&scene);
     let lit = LitScene::new(&trace, &asset).unwrap();
     let grid = asset.grid.as_ref().unwrap();
-    let sources = source_radiosity(grid, &lit.lights, &lit.reflected);
-    let far = refresh(grid, &far_sources(&lit.lights), &sources);
-    let frame = Frame { grid, lights: &lit.lights, radiosity: &lit.radiosity, far: &far };
+    let arrived = lit.arrived(grid);
+    let frame = Frame { grid, lights: &lit.lights, arrived: &arrived };
     let view = vlm_bake::gbuffer::GBuffer::trace(&trace, &scene.cameras[0], 48, 48);
     let (mut pairs, mut compared) = (0, 0);
     for point in view.points.iter().flatten() {

@@ -11,7 +11,7 @@ use crate::bvh::nearest::closest_point;
 use crate::correspondence::{Correspondence, Light, points_of_lights};
 use crate::decimate::{Decimation, LightMesh, decimate};
 use crate::flux::{conserve, steer};
-use crate::grid::{GridInput, GridOptions, StandIns, grid};
+use crate::grid::{GridInput, GridOptions, Pieces, StandIns, grid};
 use crate::ground::Ground;
 use crate::mend::{mend, thinned};
 use crate::offset::Surroundings;
@@ -140,8 +140,10 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let (mut asset, tags, proof) = prove(scene, &mut baked, options, &ground, points);
 
     clock.stage("grid");
-    let stand_ins = StandIns::new(scene, &ground, &baked);
-    asset.grid = static_grid(scene, &asset, &baked, &stand_ins, &options.grid, progress);
+    let uncovered = uncovered(scene, &patches, &proof, &baked);
+    let stand_ins = StandIns::new(scene, &ground, &baked, &uncovered);
+    let sources = GridSources { baked: &baked, stand_ins: &stand_ins, uncovered: &uncovered };
+    asset.grid = static_grid(scene, &asset, &sources, &options.grid, progress);
     asset.settings.cell_size = asset.grid.as_ref().map_or(0.0, |grid| grid.cell_size);
 
     let mut report = Report {
@@ -165,12 +167,27 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     Ok(Bake { asset, stand_ins, report })
 }
 
+/// Surface for which no light stands, in pieces about as large as the surface around a sample.
+fn uncovered(scene: &Scene, patches: &Patches, proof: &Verification, baked: &[BakedLight]) -> Pieces {
+    let points = proof.points.iter().zip(&proof.light_of_point);
+    let points = points.filter(|(_, light)| light.is_none()).map(|(point, _)| point);
+    let area: f64 = baked.iter().map(|l| area(l.corners)).sum();
+    let samples: usize = baked.iter().map(|l| l.samples.len()).sum();
+    Pieces::new(scene, patches, points, area / samples.max(1) as f64)
+}
+
+/// What shines in a grid.
+struct GridSources<'a> {
+    baked: &'a [BakedLight],
+    stand_ins: &'a StandIns,
+    uncovered: &'a Pieces,
+}
+
 /// The static grid over an asset's lights.
 fn static_grid(
     scene: &Scene,
     asset: &VlmAsset,
-    baked: &[BakedLight],
-    stand_ins: &StandIns,
+    &GridSources { baked, stand_ins, uncovered }: &GridSources,
     options: &GridOptions,
     progress: &dyn Progress,
 ) -> Option<Grid> {
@@ -183,6 +200,7 @@ fn static_grid(
     let made: Vec<u32> = baked.iter().zip(0..).filter(|(light, _)| light.authored).map(|(_, l)| l).collect();
     let input = GridInput {
         made: &made,
+        uncovered: &uncovered.pieces,
         trace: &trace,
         stand_ins,
         lights: &lights,
@@ -282,7 +300,7 @@ fn grid_report(grid: Option<&Grid>) -> GridReport {
         leaves: g.leaves.len().saturating_sub(1),
         probes: g.probes.len(),
         near_entries: g.near.len(),
-        far_entries: g.row_starts.last().map_or(0, |&end| end as usize),
+        far_entries: g.row_starts.get(g.probes.len()).map_or(0, |&end| end as usize),
         bytes: g.byte_len(),
     })
 }

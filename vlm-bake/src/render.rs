@@ -9,8 +9,8 @@ use vlm_format::{Grid, VlmAsset};
 use vlm_shaders::cpu::gather::{Gathered, Receiver, gather_together};
 use vlm_shaders::cpu::gather_static::Frame;
 use vlm_shaders::cpu::grid::leaf_at;
-use vlm_shaders::cpu::inject::{radiosity, reflect, source_radiosity};
-use vlm_shaders::cpu::refresh::{far_sources, refresh};
+use vlm_shaders::cpu::inject::{radiosity, reflect, source_radiosity, uncovered_radiosity};
+use vlm_shaders::cpu::refresh::{Arrived, far_sources, refresh};
 use vlm_shaders::cpu::upload::LightSet;
 
 use crate::gbuffer::GBuffer;
@@ -229,6 +229,8 @@ pub struct LitScene {
     pub lights: LightSet,
     /// What each sample adds to its light's radiosity, lx.
     pub reflected: Vec<Vec3>,
+    /// Radiosity of surface for which no light stands, lx.
+    pub uncovered: Vec<Vec3>,
     /// Phase 1's result: radiosity of each light, lx.
     pub radiosity: Vec<Vec3>,
     /// Wall time of phase 1.
@@ -245,12 +247,26 @@ impl LitScene {
     pub fn new(trace: &TraceScene<'_>, asset: &VlmAsset) -> Result<Self, RenderError> {
         let lights = world_lights(trace.scene, asset)?;
         let start = Instant::now();
-        let reflected =
-            reflect(&lights, |position, normal| trace.direct_irradiance(position, normal, normal));
+        let irradiance = |position, normal| trace.direct_irradiance(position, normal, normal);
+        let reflected = reflect(&lights, irradiance);
         let radiosity = radiosity(&lights, &reflected);
+        let uncovered =
+            asset.grid.as_ref().map_or_else(Vec::new, |grid| uncovered_radiosity(grid, irradiance));
         let inject_seconds = start.elapsed().as_secs_f64();
         let triangle_tags = triangle_tags(trace.scene, asset);
-        Ok(Self { lights, reflected, radiosity, inject_seconds, triangle_tags })
+        Ok(Self { lights, reflected, uncovered, radiosity, inject_seconds, triangle_tags })
+    }
+
+    /// The radiosity of the sources of a grid, which must be the asset's own.
+    #[must_use]
+    pub fn source_radiosity(&self, grid: &Grid) -> Vec<Vec3> {
+        source_radiosity(grid, &self.lights, &self.reflected, &self.uncovered)
+    }
+
+    /// What arrives at the probes of a grid, which must be the asset's own.
+    #[must_use]
+    pub fn arrived(&self, grid: &Grid) -> Arrived {
+        refresh(grid, &self.lights, &far_sources(grid, &self.lights), &self.source_radiosity(grid))
     }
 
     /// Phase 2 at every pixel by `gather`: indirect irradiance in lx, and what it took.
@@ -291,9 +307,8 @@ impl LitScene {
         progress: &dyn Progress,
     ) -> (Vec<Vec3>, RenderStats) {
         let start = Instant::now();
-        let radiosity = source_radiosity(grid, &self.lights, &self.reflected);
-        let far = refresh(grid, &far_sources(&self.lights), &radiosity);
-        let frame = Frame { grid, lights: &self.lights, radiosity: &self.radiosity, far: &far };
+        let arrived = self.arrived(grid);
+        let frame = Frame { grid, lights: &self.lights, arrived: &arrived };
         let gather = |leaf, receivers: &[Receiver]| frame.gather_together(leaf, receivers);
         self.gather_grouped(gbuffer, progress, |position| leaf_at(grid, position), gather, start)
     }

@@ -1,18 +1,17 @@
 //! The static grid: how light gets from the virtual lights to the places that it reaches, in arrays as a GPU reads them.
 
+use std::ops::Range;
+
 use glam::Vec3;
 
 /// The most probes on surface that a leaf lists.
 pub const MOST_PROBES: usize = 32;
 
-/// Visibility 1 of a [`NearLight`]; up to 255 may stand for a light that seems larger than it is.
-pub const FULL_VISIBILITY: f32 = 128.0;
-
 /// Transport from lights to probes on the visible surface and in free space, and a tree of cells that tells which of them a point
 /// looks at. World space.
 ///
 /// A point's irradiance is the blend of its probes' far light plus the form factors of their near lights, each times the
-/// blend of its visibility at the probes. See [`Probe`] for the weights of the blend.
+/// blend of the radiosities that the probes see of it. See [`Probe`] for the weights of the blend.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Grid {
     /// Minimum corner, metres.
@@ -30,8 +29,11 @@ pub struct Grid {
     pub leaf_probes: Vec<u32>,
     /// `probes.len() + 1` offsets: the lights that points around probe `i` evaluate exactly are `near[near_starts[i]..near_starts[i + 1]]`.
     pub near_starts: Vec<u32>,
-    /// Ascending for each probe.
-    pub near: Vec<NearLight>,
+    /// Numbers of lights, ascending for each probe.
+    pub near: Vec<u32>,
+    /// The form factor of each near light at its probe, above 0. The irradiance of its row over this is the radiosity that the probe sees of
+    /// it: what is hidden, and which part of it shines, is in that.
+    pub near_form_factors: Vec<f32>,
     /// Probes on surface, then those in free space.
     pub probes: Vec<Probe>,
     /// Number of probes on surface.
@@ -40,15 +42,42 @@ pub struct Grid {
     pub sample_shares: Vec<f32>,
     /// Radiosity of the surface that each light stands for over the light's own.
     pub surface_gains: Vec<f32>,
-    /// `probes.len() + 1` offsets in entries: the far light of probe `i` is that of the entries `row_starts[i]..row_starts[i + 1]`.
+    /// Surface for which no light stands.
+    pub uncovered: Vec<Uncovered>,
+    /// `probes.len() + near.len() + 1` offsets in entries: the far light of probe `i` is that of the entries
+    /// `row_starts[i]..row_starts[i + 1]`; after the probes' rows come those of the near lights, which take the same scale as the row of their
+    /// probe, and count their steps from the first sample of their light.
     pub row_starts: Vec<u32>,
     /// Two entries to a word, the first in its lower half: weight times 256 plus step. A step counts from the source of the entry before
     /// (0 at a row's beginning); an entry of weight 0 takes 256 of its steps and nothing else. Irradiance per radiosity is the
     /// weight times [`Probe::row_scale`].
     ///
-    /// Sources are patches of surface: those of the samples, in their order, then those of whole lights. A sample's radiosity is
-    /// `gain (reflectance E / share + emission)`, the light's the sum of `share` times that over its samples.
+    /// Sources are pieces of surface: those of the samples, in their order, then those of whole lights, then those for which no light
+    /// stands. A sample's radiosity is `gain (reflectance E / share + emission)`, a light's the sum of `share` times that over its
+    /// samples, that of a piece without light `reflectance E + emission`.
     pub rows: Vec<u32>,
+}
+
+/// A piece of visible surface for which no light stands: probes see its light, and no pixel evaluates its form factor. 64 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Uncovered {
+    /// Where phase 1 looks, metres.
+    pub position: Vec3,
+    /// Square metres.
+    pub area: f32,
+    /// Unit normal.
+    pub normal: Vec3,
+    /// Not used.
+    pub padding: f32,
+    /// Radiosity per irradiance: mean albedo times what artists ask for.
+    pub reflectance: Vec3,
+    /// Not used.
+    pub padding_2: f32,
+    /// Radiosity that it emits by itself, lx.
+    pub emission: Vec3,
+    /// Not used.
+    pub padding_3: f32,
 }
 
 /// Where the lists of a leaf begin; they end where those of the next leaf do.
@@ -59,32 +88,6 @@ pub struct Leaf {
     pub probes: u32,
     /// Likewise: probes in free space.
     pub free_probes: u32,
-}
-
-/// A light whose form factor points around a probe evaluate exactly, and the share of it that the probe sees: the light's number times
-/// 256, plus the visibility times 128.
-#[repr(transparent)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct NearLight(pub u32);
-
-impl NearLight {
-    /// Of a light below 2^24 and a visibility in units of 1 / [`FULL_VISIBILITY`].
-    #[must_use]
-    pub fn new(light: u32, visibility: u8) -> Self {
-        Self((light << 8) | u32::from(visibility))
-    }
-
-    /// Number of the light.
-    #[must_use]
-    pub fn light(self) -> u32 {
-        self.0 >> 8
-    }
-
-    /// The share of the light's form factor that the probe sees.
-    #[must_use]
-    pub fn visibility(self) -> f32 {
-        (self.0 & 0xff) as f32 / FULL_VISIBILITY
-    }
 }
 
 /// A place where the light's way is known. 64 bytes.
@@ -162,7 +165,7 @@ pub struct Row<'a> {
     words: &'a [u32],
     next: u32,
     end: u32,
-    light: u32,
+    source: u32,
 }
 
 impl Grid {
@@ -174,7 +177,7 @@ impl Grid {
 
     /// Bytes of each array, by its name in the file.
     #[must_use]
-    pub fn sizes(&self) -> [(&'static str, usize); 10] {
+    pub fn sizes(&self) -> [(&'static str, usize); 12] {
         [
             ("cells", size_of_val(&*self.cells)),
             ("leaves", size_of_val(&*self.leaves)),
@@ -182,18 +185,33 @@ impl Grid {
             ("probes", size_of_val(&*self.probes)),
             ("nearStarts", size_of_val(&*self.near_starts)),
             ("near", size_of_val(&*self.near)),
+            ("nearFormFactors", size_of_val(&*self.near_form_factors)),
             ("sampleShares", size_of_val(&*self.sample_shares)),
             ("surfaceGains", size_of_val(&*self.surface_gains)),
+            ("uncovered", size_of_val(&*self.uncovered)),
             ("rowStarts", size_of_val(&*self.row_starts)),
             ("rows", size_of_val(&*self.rows)),
         ]
     }
 
+    /// Indices of the near lights of a probe; empty where they are out of range.
+    #[must_use]
+    pub fn near_range(&self, probe: usize) -> Range<usize> {
+        let range = self.near_starts.get(probe).zip(self.near_starts.get(probe + 1));
+        let range = range.map_or(0..0, |(&from, &to)| from as usize..to as usize);
+        if range.end <= self.near.len() { range } else { 0..0 }
+    }
+
     /// The near lights of a probe; empty where indices are out of range.
     #[must_use]
-    pub fn near_of(&self, probe: usize) -> &[NearLight] {
-        let range = self.near_starts.get(probe).zip(self.near_starts.get(probe + 1));
-        range.and_then(|(&from, &to)| self.near.get(from as usize..to as usize)).unwrap_or(&[])
+    pub fn near_of(&self, probe: usize) -> &[u32] {
+        self.near.get(self.near_range(probe)).unwrap_or(&[])
+    }
+
+    /// What near light `near` adds at its probe; `first_sample` is the first of its light. Empty where indices are out of range.
+    #[must_use]
+    pub fn near_row(&self, near: usize, first_sample: u32) -> Row<'_> {
+        Row { source: first_sample, ..self.row(self.probes.len() + near) }
     }
 
     /// The far light of a probe; empty where indices are out of range.
@@ -201,7 +219,7 @@ impl Grid {
     pub fn row(&self, probe: usize) -> Row<'_> {
         let range = self.row_starts.get(probe).zip(self.row_starts.get(probe + 1));
         let (next, end) = range.map_or((0, 0), |(&start, &end)| (start, end));
-        Row { words: &self.rows, next, end, light: 0 }
+        Row { words: &self.rows, next, end, source: 0 }
     }
 }
 
@@ -214,9 +232,9 @@ impl Iterator for Row<'_> {
             let entry = (word >> (16 * (self.next & 1))) & 0xffff;
             self.next += 1;
             let (step, weight) = (entry & 0xff, entry >> 8);
-            self.light = self.light.wrapping_add(if weight == 0 { 256 * step } else { step });
+            self.source = self.source.wrapping_add(if weight == 0 { 256 * step } else { step });
             if weight > 0 {
-                return Some((self.light, weight));
+                return Some((self.source, weight));
             }
         }
         None
@@ -239,19 +257,19 @@ impl Default for RowWriter {
 }
 
 impl RowWriter {
-    /// Adds a row of lights, ascending, with weights of 1 to 255.
-    pub fn push(&mut self, row: impl IntoIterator<Item = (u32, u8)>) {
+    /// Adds a row of sources, ascending from `first` on, with weights of 1 to 255.
+    pub fn push(&mut self, first: u32, row: impl IntoIterator<Item = (u32, u8)>) {
         let mut end = self.starts.last().copied().unwrap_or(0);
-        let mut at = 0_u32;
-        for (light, weight) in row {
-            let mut step = light.saturating_sub(at);
+        let mut at = first;
+        for (source, weight) in row {
+            let mut step = source.saturating_sub(at);
             while step > 0xff {
                 let pages = (step / 256).min(0xff);
                 self.entry(&mut end, pages);
                 step -= 256 * pages;
             }
             self.entry(&mut end, (u32::from(weight) << 8) | step);
-            at = light;
+            at = source;
         }
         self.starts.push(end);
     }
@@ -279,13 +297,14 @@ mod tests {
             vec![(20_000_000, 200)],
         ];
         let mut writer = RowWriter::default();
-        rows.iter().for_each(|row| writer.push(row.iter().copied()));
+        rows.iter().for_each(|row| writer.push(0, row.iter().copied()));
         let grid = Grid { row_starts: writer.starts, rows: writer.words, ..Grid::default() };
         for (i, row) in rows.iter().enumerate() {
             let read: Vec<(u32, u8)> = grid.row(i).map(|(light, weight)| (light, weight as u8)).collect();
             assert_eq!(&read, row, "row {i}");
         }
         assert_eq!(grid.row(5).next(), None, "out of range");
+        assert_eq!(grid.near_row(2, 7).next(), Some((70_007, 3)), "counted from the light's first sample");
     }
 
     #[test]

@@ -30,7 +30,7 @@ mod save;
 pub use asset::{Sample, Settings, Vlm, VlmAsset};
 pub use container::{GltfFile, Kind};
 pub use error::{Code, Error, Issue, Severity, Stale};
-pub use grid::{FULL_VISIBILITY, Grid, Leaf, MOST_PROBES, NearLight, Probe, Row, RowWriter};
+pub use grid::{Grid, Leaf, MOST_PROBES, Probe, Row, RowWriter, Uncovered};
 pub use package::{Container, OutputFile, Target};
 pub use read::{read_vlm, read_vlm_unchecked};
 pub use save::{write_atomic, write_file};

@@ -8,7 +8,7 @@ use crate::check::{self, array, count, index};
 use crate::container::GltfFile;
 use crate::digest::{self, Source};
 use crate::error::{Error, Issue, Stale};
-use crate::grid::{Grid, Probe};
+use crate::grid::Grid;
 use crate::nodes;
 use crate::strip::EXTENSION;
 use crate::tags::{TriangleTags, elements};
@@ -149,13 +149,15 @@ impl<'a> Reader<'a> {
             leaves: self.records("leaves"),
             leaf_probes: self.integers("grid", "leafProbes"),
             near_starts: self.integers("grid", "nearStarts"),
-            near: self.records("near"),
-            probes: self.probes(),
+            near: self.integers("grid", "near"),
+            near_form_factors: self.scalars("nearFormFactors"),
+            probes: self.structs("probes"),
             surface_probes: count(json, "surfaceProbes")
                 .and_then(|n| u32::try_from(n).ok())
                 .unwrap_or(u32::MAX),
             sample_shares: self.scalars("sampleShares"),
             surface_gains: self.scalars("surfaceGains"),
+            uncovered: self.structs("uncovered"),
             row_starts: self.integers("grid", "rowStarts"),
             rows: self.integers("grid", "rows"),
         }
@@ -175,13 +177,14 @@ impl<'a> Reader<'a> {
         self.elements(&self.place("grid", key), "SCALAR", read)
     }
 
-    fn probes(&mut self) -> Vec<Probe> {
+    /// Structs of vectors of four numbers; a torn one at the end is left out.
+    fn structs<T: bytemuck::Pod>(&mut self, key: &str) -> Vec<T> {
         let read = |file: &GltfFile, accessor| {
             let values = file.read_vec4(accessor)?;
             let bytes = values.iter().flat_map(|value| value.to_array()).flat_map(f32::to_le_bytes).collect();
             Ok((values, bytes))
         };
-        let vectors = self.elements(&self.place("grid", "probes"), "VEC4", read);
+        let vectors = self.elements(&self.place("grid", key), "VEC4", read);
         from_words(bytemuck::cast_slice(&vectors))
     }
 

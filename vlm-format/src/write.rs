@@ -121,16 +121,12 @@ impl Arrays {
         self.integers(&mut json, "leaves", bytemuck::cast_slice(&grid.leaves));
         self.integers(&mut json, "leafProbes", &grid.leaf_probes);
         self.integers(&mut json, "nearStarts", &grid.near_starts);
-        self.integers(&mut json, "near", bytemuck::cast_slice(&grid.near));
-        let probes: Vec<u8> = grid
-            .probes
-            .iter()
-            .flat_map(|p| bytemuck::cast::<_, [f32; 16]>(*p))
-            .flat_map(f32::to_le_bytes)
-            .collect();
-        self.push(&mut json, "probes", "VEC4", 5126, 4 * grid.probes.len(), &probes);
+        self.integers(&mut json, "near", &grid.near);
+        self.scalars(&mut json, "nearFormFactors", &grid.near_form_factors);
+        self.structs(&mut json, "probes", bytemuck::cast_slice(&grid.probes));
         self.scalars(&mut json, "sampleShares", &grid.sample_shares);
         self.scalars(&mut json, "surfaceGains", &grid.surface_gains);
+        self.structs(&mut json, "uncovered", bytemuck::cast_slice(&grid.uncovered));
         self.integers(&mut json, "rowStarts", &grid.row_starts);
         self.integers(&mut json, "rows", &grid.rows);
         Value::Object(json)
@@ -146,6 +142,12 @@ impl Arrays {
         let bytes: Vec<u8> =
             values.iter().flat_map(|value| value.to_array()).flat_map(f32::to_le_bytes).collect();
         self.push(json, key, "VEC3", 5126, values.len(), &bytes);
+    }
+
+    /// Structs of vectors of four numbers.
+    fn structs(&mut self, json: &mut Map<String, Value>, key: &str, vectors: &[[f32; 4]]) {
+        let bytes: Vec<u8> = vectors.iter().flatten().copied().flat_map(f32::to_le_bytes).collect();
+        self.push(json, key, "VEC4", 5126, vectors.len(), &bytes);
     }
 
     fn scalars(&mut self, json: &mut Map<String, Value>, key: &str, values: &[f32]) {

@@ -1,12 +1,13 @@
 //! Phase 2 by the static grid: the near lights of a point's probes exactly, all others through the probes.
 
 use glam::Vec3;
-use vlm_format::{Grid, MOST_PROBES, NearLight};
+use std::ops::Range;
+use vlm_format::{Grid, MOST_PROBES};
 
-use super::form_factor::{LightGeometry, Receivers, form_factor, form_factors, is_behind};
+use super::form_factor::{Receivers, form_factor, form_factors, is_behind};
 use super::gather::{Gathered, Receiver};
 use super::grid::{Blend, blend, leaf_at};
-use super::refresh::FarLight;
+use super::refresh::Arrived;
 use super::upload::LightSet;
 
 /// What a frame's gathering reads.
@@ -16,13 +17,11 @@ pub struct Frame<'a> {
     pub grid: &'a Grid,
     /// The lights in world space.
     pub lights: &'a LightSet,
-    /// Phase 1's result, one per light, lx.
-    pub radiosity: &'a [Vec3],
-    /// The far light of each probe on surface.
-    pub far: &'a [FarLight],
+    /// What arrives at the probes.
+    pub arrived: &'a Arrived,
 }
 
-impl<'a> Frame<'a> {
+impl Frame<'_> {
     /// Irradiance at a point of a surface that stands still.
     #[must_use]
     pub fn gather(&self, receiver: &Receiver) -> Gathered {
@@ -30,30 +29,29 @@ impl<'a> Frame<'a> {
         let blend = blend(self.grid, leaf, receiver);
         let mut gathered = Gathered { irradiance: self.far_light(&blend, receiver), pairs: 0 };
         // The probes' lists ascend, so each light is met once, with all probes that see it.
-        let mut lists = [&[] as &[NearLight]; MOST_PROBES];
+        let mut lists: [Range<usize>; MOST_PROBES] = std::array::from_fn(|_| 0..0);
         for (i, list) in lists.iter_mut().enumerate().take(blend.count as usize) {
             if blend.weights[i] > 0.0 {
                 *list = self.near(&blend, i);
             }
         }
         loop {
-            let heads = lists[..blend.count as usize].iter().filter_map(|list| list.first());
-            let Some(light) = heads.map(|near| near.light()).min() else { break };
-            let mut seen = 0.0;
+            let heads = lists[..blend.count as usize].iter().filter(|list| list.start < list.end);
+            let Some(light) = heads.map(|list| self.grid.near[list.start]).min() else { break };
+            let mut radiosity = Vec3::ZERO;
             for (list, weight) in lists.iter_mut().zip(blend.weights) {
-                if let Some((near, rest)) = list.split_first().filter(|(near, _)| near.light() == light) {
-                    seen += weight * near.visibility();
-                    *list = rest;
+                if list.start < list.end && self.grid.near[list.start] == light {
+                    radiosity += self.near_radiosity(list.start) * weight;
+                    list.start += 1;
                 }
             }
-            let Some((geometry, radiosity)) = self.light(light) else { continue };
+            let Some(geometry) = self.lights.geometry.get(light as usize) else { continue };
             if radiosity == Vec3::ZERO {
                 continue;
             }
             gathered.pairs += 1;
             if !is_behind(geometry, receiver.position, receiver.geometric_normal) {
-                let form_factor = form_factor(geometry, receiver.position, receiver.normal);
-                gathered.irradiance += radiosity * (form_factor * seen);
+                gathered.irradiance += radiosity * form_factor(geometry, receiver.position, receiver.normal);
             }
         }
         gathered
@@ -73,16 +71,14 @@ impl<'a> Frame<'a> {
         let points =
             Receivers::on_surfaces(receivers.iter().map(|r| (r.position, r.normal, r.geometric_normal)));
         let mut form_factor = vec![0.0; receivers.len()];
-        for same in near.chunk_by(|a, b| a.0.light() == b.0.light()) {
-            let Some((geometry, radiosity)) = self.light(same[0].0.light()) else { continue };
-            if radiosity == Vec3::ZERO {
-                continue;
-            }
+        for same in near.chunk_by(|a, b| a.light == b.light) {
+            let Some(geometry) = self.lights.geometry.get(same[0].light as usize) else { continue };
             form_factors(geometry, &points, &mut form_factor);
             for ((gathered, blend), form_factor) in gathered.iter_mut().zip(&blends).zip(&form_factor) {
-                let seen: f32 = same.iter().map(|&(near, i)| blend.weights[i] * near.visibility()).sum();
-                gathered.pairs += u64::from(seen != 0.0);
-                gathered.irradiance += radiosity * (form_factor * seen);
+                let seen = |near: &NearOfLeaf| near.radiosity * blend.weights[near.place];
+                let radiosity: Vec3 = same.iter().map(seen).sum();
+                gathered.pairs += u64::from(radiosity != Vec3::ZERO);
+                gathered.irradiance += radiosity * *form_factor;
             }
         }
         gathered
@@ -94,7 +90,7 @@ impl<'a> Frame<'a> {
             let weight = blend.weights[i];
             if weight > 0.0
                 && let Some(probe) = self.probe(blend, i)
-                && let Some((place, far)) = self.grid.probes.get(probe).zip(self.far.get(probe))
+                && let Some((place, far)) = self.grid.probes.get(probe).zip(self.arrived.far.get(probe))
             {
                 irradiance += far.irradiance(receiver.normal, place.local(receiver.position)) * weight;
             }
@@ -102,14 +98,20 @@ impl<'a> Frame<'a> {
         irradiance
     }
 
-    /// The near lights of all probes that count for some of the points, by light, with the probe's place in the leaf.
-    fn near_of_any(&self, blends: &[Blend]) -> Vec<(NearLight, usize)> {
+    /// The near lights of all probes that count for some of the points and from which light comes, by light.
+    fn near_of_any(&self, blends: &[Blend]) -> Vec<NearOfLeaf> {
         let Some(first) = blends.first() else { return Vec::new() };
-        let counts = |&i: &usize| blends.iter().any(|blend| blend.weights[i] > 0.0);
-        let probes = (0..first.count as usize).filter(counts);
-        let mut near: Vec<(NearLight, usize)> =
-            probes.flat_map(|i| self.near(first, i).iter().map(move |&near| (near, i))).collect();
-        near.sort_unstable();
+        let counts = |&place: &usize| blends.iter().any(|blend| blend.weights[place] > 0.0);
+        let near = |place| {
+            let of_leaf = move |near| {
+                let light = self.grid.near[near];
+                NearOfLeaf { light, place, radiosity: self.near_radiosity(near) }
+            };
+            self.near(first, place).map(of_leaf)
+        };
+        let all = (0..first.count as usize).filter(counts).flat_map(near);
+        let mut near: Vec<NearOfLeaf> = all.filter(|near| near.radiosity != Vec3::ZERO).collect();
+        near.sort_unstable_by_key(|near| (near.light, near.place));
         near
     }
 
@@ -117,11 +119,20 @@ impl<'a> Frame<'a> {
         self.grid.leaf_probes.get(blend.first as usize + i).map(|&probe| probe as usize)
     }
 
-    fn near(&self, blend: &Blend, i: usize) -> &'a [NearLight] {
-        self.probe(blend, i).map_or(&[], |probe| self.grid.near_of(probe))
+    /// The near lights of a probe of a leaf.
+    fn near(&self, blend: &Blend, i: usize) -> Range<usize> {
+        self.probe(blend, i).map_or(0..0, |probe| self.grid.near_range(probe))
     }
 
-    fn light(&self, light: u32) -> Option<(&'a LightGeometry, Vec3)> {
-        Some((self.lights.geometry.get(light as usize)?, *self.radiosity.get(light as usize)?))
+    fn near_radiosity(&self, near: usize) -> Vec3 {
+        self.arrived.near.get(near).copied().unwrap_or_default()
     }
+}
+
+/// A near light of a probe of a leaf.
+struct NearOfLeaf {
+    light: u32,
+    /// The probe's place in the leaf.
+    place: usize,
+    radiosity: Vec3,
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
-use vlm_format::Grid;
+use vlm_format::{Grid, Uncovered};
 
 use super::upload::LightSet;
 
@@ -31,9 +31,18 @@ pub fn radiosity(lights: &LightSet, reflected: &[Vec3]) -> Vec<Vec3> {
     (0..lights.len()).into_par_iter().map(radiosity).collect()
 }
 
-/// The radiosity of the grid's sources, lx: of the surface around each sample, then of the surface of each light.
+/// The radiosity of each piece of surface for which no light stands, lx; `irradiance` as in [`inject`].
 #[must_use]
-pub fn source_radiosity(grid: &Grid, lights: &LightSet, reflected: &[Vec3]) -> Vec<Vec3> {
+pub fn uncovered_radiosity(grid: &Grid, irradiance: impl Fn(Vec3, Vec3) -> Vec3 + Sync) -> Vec<Vec3> {
+    let radiosity =
+        |piece: &Uncovered| piece.reflectance * irradiance(piece.position, piece.normal) + piece.emission;
+    grid.uncovered.par_iter().map(radiosity).collect()
+}
+
+/// The radiosity of the grid's sources, lx: of the surface around each sample, of the surface of each light, and of surface for which
+/// none stands.
+#[must_use]
+pub fn source_radiosity(grid: &Grid, lights: &LightSet, reflected: &[Vec3], uncovered: &[Vec3]) -> Vec<Vec3> {
     let mut sources = vec![Vec3::ZERO; lights.samples.len() + lights.len()];
     let (of_samples, of_lights) = sources.split_at_mut(lights.samples.len());
     let radiosity = radiosity(lights, reflected);
@@ -48,6 +57,7 @@ pub fn source_radiosity(grid: &Grid, lights: &LightSet, reflected: &[Vec3]) -> V
             }
         }
     }
+    sources.extend_from_slice(uncovered);
     sources
 }
 

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
-use vlm_format::{Grid, Probe, Sample};
+use vlm_format::{Grid, Probe, Sample, Uncovered};
 
 use super::form_factor::LightGeometry;
 use super::upload::LightSet;
@@ -25,16 +25,23 @@ pub struct FarSource {
     pub padding_2: f32,
 }
 
-/// All sources of a grid: of the samples, then of the lights.
+/// All sources of a grid: of the samples, then of the lights, then of surface for which none stands.
 #[must_use]
-pub fn far_sources(lights: &LightSet) -> Vec<FarSource> {
+pub fn far_sources(grid: &Grid, lights: &LightSet) -> Vec<FarSource> {
     let of_sample = |s: &Sample| FarSource { centroid: s.position, normal: s.normal, ..FarSource::default() };
     let of_light = |light: &LightGeometry| FarSource {
         centroid: light.centroid(),
         normal: light.normal.normalize_or_zero(),
         ..FarSource::default()
     };
-    lights.samples.iter().map(of_sample).chain(lights.geometry.iter().map(of_light)).collect()
+    let of_piece = |piece: &Uncovered| FarSource {
+        centroid: piece.position,
+        normal: piece.normal,
+        ..FarSource::default()
+    };
+    let of_lights = lights.geometry.iter().map(of_light);
+    let of_pieces = grid.uncovered.iter().map(of_piece);
+    lights.samples.iter().map(of_sample).chain(of_lights).chain(of_pieces).collect()
 }
 
 /// The far light at a probe on surface: `E(n, u, v) = x n.x + y n.y + z n.z + along_u u + along_v v`.
@@ -59,11 +66,37 @@ impl FarLight {
     }
 }
 
-/// The far light of every probe on surface; `radiosity` is that of the sources.
+/// What a frame's pixels find at the probes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Arrived {
+    /// The far light of each probe on surface.
+    pub far: Vec<FarLight>,
+    /// The radiosity that its probe sees of each near light, lx: the irradiance of its row over its form factor there.
+    pub near: Vec<Vec3>,
+}
+
+/// The light that arrives at every probe on surface; `radiosity` is that of the sources.
 #[must_use]
-pub fn refresh(grid: &Grid, sources: &[FarSource], radiosity: &[Vec3]) -> Vec<FarLight> {
-    let count = grid.surface_probes as usize;
-    (0..count).into_par_iter().map(|probe| far_light(grid, probe, sources, radiosity)).collect()
+pub fn refresh(grid: &Grid, lights: &LightSet, sources: &[FarSource], radiosity: &[Vec3]) -> Arrived {
+    let probes = (0..grid.surface_probes as usize).into_par_iter();
+    let far = probes.map(|probe| far_light(grid, probe, sources, radiosity)).collect();
+    let probes = (0..grid.probes.len()).into_par_iter();
+    let near = probes.flat_map_iter(|probe| {
+        let row_scale = grid.probes[probe].row_scale;
+        grid.near_range(probe).map(move |near| near_radiosity(grid, near, row_scale, lights, radiosity))
+    });
+    Arrived { far, near: near.collect() }
+}
+
+fn near_radiosity(grid: &Grid, number: usize, row_scale: f32, lights: &LightSet, radiosity: &[Vec3]) -> Vec3 {
+    let (light, form_factor) =
+        (grid.near[number], grid.near_form_factors.get(number).copied().unwrap_or(1.0));
+    let first_sample = lights.sample_starts.get(light as usize).copied().unwrap_or(u32::MAX);
+    let mut irradiance = Vec3::ZERO;
+    for (source, weight) in grid.near_row(number, first_sample) {
+        irradiance += radiosity.get(source as usize).copied().unwrap_or_default() * weight as f32;
+    }
+    irradiance * (row_scale / form_factor)
 }
 
 fn far_light(grid: &Grid, number: usize, sources: &[FarSource], radiosity: &[Vec3]) -> FarLight {

@@ -16,14 +16,18 @@ mod spacing;
 mod stand_in;
 mod transport;
 mod tree;
+mod uncovered;
 
 pub use stand_in::StandIns;
 pub use transport::transport;
+pub use uncovered::Pieces;
 
 use glam::{DVec3, IVec3, Vec3};
-use vlm_format::{Grid, NearLight, Probe, RowWriter};
+use vlm_format::{Grid, Probe, RowWriter, Uncovered};
 use vlm_shaders::cpu::upload::LightSet;
 
+use self::near::NearLight;
+use self::transport::Row;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::shade::TraceScene;
@@ -60,6 +64,17 @@ pub struct GridInput<'a> {
     pub shares: &'a [f32],
     /// The lights that artists made.
     pub made: &'a [u32],
+    /// Surface for which no light stands.
+    pub uncovered: &'a [Uncovered],
+}
+
+impl GridInput<'_> {
+    /// The light to which a source belongs; `None` for surface for which none stands.
+    fn light_of(&self, source: u32) -> Option<u32> {
+        let samples = self.light_of_sample.len() as u32;
+        let of_sample = self.light_of_sample.get(source as usize).copied();
+        of_sample.or_else(|| (source - samples < self.lights.len() as u32).then_some(source - samples))
+    }
 }
 
 /// Builds the grid; `None` without lights or without surface.
@@ -85,9 +100,10 @@ pub fn grid(input: &GridInput, options: &GridOptions, progress: &dyn Progress) -
     let rows = transport::rows(input, &places, options.rays, progress);
     let (near, far) = near::split(input, &places, &probes, rows, options);
     let cells = tree::tree(input.trace.scene, bounds, &probes, options.cell_size);
-    let mut grid = encode(cells, probes, &near, &far);
+    let mut grid = encode(cells, probes, &near, &far, input.light_of_sample);
     grid.sample_shares = input.shares.to_vec();
     grid.surface_gains = input.gains.to_vec();
+    grid.uncovered = input.uncovered.to_vec();
     Some(grid)
 }
 
@@ -101,32 +117,57 @@ fn cells_between(low: IVec3, high: IVec3) -> impl Iterator<Item = IVec3> {
 /// spacing. More rounds leave less of it.
 const COVERING: [f32; 3] = [0.9, 0.6, 0.4];
 
-/// Packs the rows into the grid. Rounding is carried along a row, so that its sum stays.
-fn encode(mut grid: Grid, mut probes: Vec<Probe>, near: &[Vec<NearLight>], far: &[Vec<(u32, f32)>]) -> Grid {
+/// Packs the rows into the grid.
+fn encode(
+    mut grid: Grid,
+    mut probes: Vec<Probe>,
+    near: &[Vec<NearLight>],
+    far: &[Row],
+    light_of_sample: &[u32],
+) -> Grid {
     let mut rows = RowWriter::default();
-    for (probe, row) in probes.iter_mut().zip(far) {
-        let largest = row.iter().map(|(_, weight)| *weight).fold(0.0, f32::max);
-        probe.row_scale = largest / 255.0;
-        let mut carried = 0.0;
-        rows.push(row.iter().filter_map(|&(light, weight)| {
-            let exact = weight / probe.row_scale + carried;
-            let rounded = exact.round().clamp(0.0, 255.0);
-            carried = exact - rounded;
-            (rounded > 0.0).then_some((light, rounded as u8))
-        }));
+    let mut near_rows: Vec<(u32, Vec<(u32, u8)>)> = Vec::new();
+    grid.near_starts = vec![0];
+    for ((probe, row), near) in probes.iter_mut().zip(far).zip(near) {
+        let weights = near.iter().flat_map(|near| &near.row).chain(row).map(|(_, weight)| *weight);
+        probe.row_scale = weights.fold(0.0, f32::max) / 255.0;
+        let mut rounding = Rounding { scale: probe.row_scale, carried: 0.0 };
+        rows.push(0, rounding.row(row));
+        for near in near {
+            let row = rounding.row(&near.row);
+            if !row.is_empty() {
+                let first = light_of_sample.partition_point(|&light| light < near.light);
+                near_rows.push((first as u32, row));
+                grid.near.push(near.light);
+                grid.near_form_factors.push(near.form_factor);
+            }
+        }
+        grid.near_starts.push(grid.near.len() as u32);
     }
+    near_rows.into_iter().for_each(|(first, row)| rows.push(first, row));
     grid.surface_probes = probes.len() as u32;
     grid.probes = probes;
-    grid.near_starts = std::iter::once(0)
-        .chain(near.iter().scan(0, |end, list| {
-            *end += list.len() as u32;
-            Some(*end)
-        }))
-        .collect();
-    grid.near = near.concat();
     grid.row_starts = rows.starts;
     grid.rows = rows.words;
     grid
+}
+
+/// Rounds weights to bytes, and carries what is lost on to the next, so that the sum stays.
+struct Rounding {
+    scale: f32,
+    carried: f32,
+}
+
+impl Rounding {
+    fn row(&mut self, row: &[(u32, f32)]) -> Vec<(u32, u8)> {
+        let round = |&(source, weight): &(u32, f32)| {
+            let exact = weight / self.scale + self.carried;
+            let rounded = exact.round().clamp(0.0, 255.0);
+            self.carried = exact - rounded;
+            (rounded > 0.0).then_some((source, rounded as u8))
+        };
+        row.iter().filter_map(round).collect()
+    }
 }
 
 impl Scene {

@@ -1,7 +1,7 @@
 //! Which lights a probe leaves to the pixels around it, and how much of them it sees.
 
 use rayon::prelude::*;
-use vlm_format::{FULL_VISIBILITY, NearLight, Probe};
+use vlm_format::Probe;
 use vlm_shaders::cpu::form_factor::{form_factor, is_behind};
 use vlm_shaders::cpu::upload::LightSet;
 
@@ -13,10 +13,22 @@ use super::{GridInput, GridOptions};
 /// more lights near.
 const LEAST_CHANGE: f32 = 2e-3;
 
-/// Near lights of a probe, ascending by light.
-pub type NearRow = Vec<NearLight>;
+/// A near light may seem up to this many times as bright as it is, since it lies behind the surface that the probe sees. What is beyond
+/// stays far.
+const MOST_BRIGHT: f32 = 2.0;
 
-/// Splits each row into near lights and the rest.
+/// A near light of a probe.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct NearLight {
+    /// Its number.
+    pub light: u32,
+    /// Its form factor at the probe.
+    pub form_factor: f32,
+    /// What the probe gets of its sources.
+    pub row: Row,
+}
+
+/// Splits each row into near lights, ascending, and the rest.
 #[must_use]
 pub fn split(
     input: &GridInput,
@@ -24,7 +36,7 @@ pub fn split(
     probes: &[Probe],
     rows: Vec<Row>,
     options: &GridOptions,
-) -> (Vec<NearRow>, Vec<Row>) {
+) -> (Vec<Vec<NearLight>>, Vec<Row>) {
     let part = |(i, row)| input.split(&places[i], &probes[i], row, options.near as usize);
     rows.into_par_iter().enumerate().map(part).unzip()
 }
@@ -40,34 +52,30 @@ struct Candidate {
 }
 
 impl GridInput<'_> {
-    fn split(&self, place: &Place, probe: &Probe, mut row: Row, most: usize) -> (NearRow, Row) {
-        let mut near: NearRow = Vec::new();
-        let mut kept: Vec<(u32, f32)> = Vec::new();
-        for candidate in self.candidates(place, probe, &row, most) {
-            let exact = candidate.form_factor / self.gains[candidate.light as usize];
-            // What a byte cannot hold stays far, so that both together are the whole.
-            let visibility = (candidate.share / exact * FULL_VISIBILITY).round().clamp(0.0, 255.0);
-            if visibility > 0.0 {
-                near.push(NearLight::new(candidate.light, visibility as u8));
-                kept.push((
-                    candidate.light,
-                    (1.0 - exact * visibility / FULL_VISIBILITY / candidate.share).max(0.0),
-                ));
-            }
+    fn split(&self, place: &Place, probe: &Probe, mut row: Row, most: usize) -> (Vec<NearLight>, Row) {
+        let mut all: Vec<NearLight> = Vec::new();
+        let mut near_shares: Vec<f32> = Vec::new();
+        for Candidate { light, share, form_factor, .. } in self.candidates(place, probe, &row, most) {
+            near_shares.push((MOST_BRIGHT * form_factor / (share * self.gains[light as usize])).min(1.0));
+            all.push(NearLight { light, form_factor, row: Row::new() });
         }
         for (source, share) in &mut row {
-            if let Ok(i) = kept.binary_search_by_key(&self.light_of(*source), |(light, _)| *light) {
-                *share *= kept[i].1;
+            if let Some(light) = self.light_of(*source)
+                && let Ok(i) = all.binary_search_by_key(&light, |near| near.light)
+            {
+                all[i].row.push((*source, *share * near_shares[i]));
+                *share *= 1.0 - near_shares[i];
             }
         }
         row.retain(|(_, share)| *share > 0.0);
-        (near, row)
+        (all, row)
     }
 
     /// The lights that change most, ascending by light.
     fn candidates(&self, place: &Place, probe: &Probe, row: &Row, most: usize) -> Vec<Candidate> {
         let all: f32 = row.iter().map(|(_, share)| share).sum();
-        let mut by_light: Row = row.iter().map(|&(source, share)| (self.light_of(source), share)).collect();
+        let mut by_light: Row =
+            row.iter().filter_map(|&(source, share)| Some((self.light_of(source)?, share))).collect();
         by_light.sort_by_key(|(light, _)| *light);
         let candidate = |same: &[(u32, f32)]| {
             let light = same[0].0;
@@ -87,11 +95,6 @@ impl GridInput<'_> {
         candidates.truncate(most);
         candidates.sort_by_key(|c| c.light);
         candidates
-    }
-
-    fn light_of(&self, source: u32) -> u32 {
-        let samples = self.light_of_sample.len() as u32;
-        if source < samples { self.light_of_sample[source as usize] } else { source - samples }
     }
 }
 

@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::uncovered::Pieces;
 use crate::correspondence::{Correspondence, Light};
 use crate::ground::Ground;
 use crate::grouped_bvh::GroupedBvh;
@@ -34,7 +35,7 @@ pub struct StandIns {
 impl StandIns {
     /// Tabulates the lights (as the asset orders them) over the visible surface.
     #[must_use]
-    pub fn new(scene: &Scene, ground: &Ground, baked: &[BakedLight]) -> Self {
+    pub fn new(scene: &Scene, ground: &Ground, baked: &[BakedLight], uncovered: &Pieces) -> Self {
         let lights: Vec<Light> =
             baked.iter().map(|l| Light { corners: l.corners, region: l.region, back: l.back }).collect();
         let search = Search::new(ground, &lights, |l| !baked[l].authored);
@@ -42,6 +43,7 @@ impl StandIns {
         let cell_area = total / (lights.len().max(1) as f64 * CELLS_PER_LIGHT);
         let patches = ground.patches;
         let starts = sample_starts(baked);
+        let first_piece = (baked.iter().map(|l| l.samples.len()).sum::<usize>() + baked.len()) as u32;
         let table = |(t, scene_triangle): (usize, u32)| {
             let corners = scene.corners(scene_triangle as usize).unwrap_or_default().map(Vec3::as_dvec3);
             let rows = (area(corners) / cell_area).sqrt().ceil().clamp(1.0, MOST_ROWS) as u16;
@@ -50,7 +52,12 @@ impl StandIns {
             let cells = sides.iter().flat_map(|&front| (0..cells(rows)).map(move |cell| (cell, front)));
             let sample = |(cell, front)| {
                 let point = point(ground, t, corners, centre(cell, rows), front);
-                let light = search.light_of(&point)? as usize;
+                let own = search.correspondence.light_of(&point);
+                let piece = own.is_none().then(|| uncovered.at(patches, &point)).flatten();
+                if let Some(piece) = piece {
+                    return Some(first_piece + piece);
+                }
+                let light = own.or_else(|| search.other_light(&point))? as usize;
                 Some(starts[light] + nearest_sample(&baked[light], point.position)?)
             };
             let samples = cells.map(|cell| sample(cell).unwrap_or(NONE)).collect::<Vec<u32>>();
@@ -101,12 +108,11 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The light that stands for a place, else the nearest of its region, else the nearest that looks its way.
-    fn light_of(&self, point: &SurfacePoint) -> Option<u32> {
+    /// For a place for which no light stands, the nearest of its region, else the nearest that looks its way.
+    fn other_light(&self, point: &SurfacePoint) -> Option<u32> {
         let facing = |l: u32| self.normals[l as usize].dot(point.normal) > FACING_COSINE;
         let any = || Some(self.bvh.closest(0, point.inner, self.reach, facing)?.triangle);
-        let own = self.correspondence.light_of(point);
-        own.or_else(|| self.correspondence.nearest_in_region(point)).or_else(any)
+        self.correspondence.nearest_in_region(point).or_else(any)
     }
 }
 

@@ -52,19 +52,20 @@ pub fn transport(
 
 /// Joins the samples of lights that seem small into the lights themselves.
 fn whole_lights(input: &GridInput, place: &Place, row: &Row) -> Row {
-    let light_of = |source: u32| input.light_of_sample[source as usize];
     let samples = input.light_of_sample.len() as u32;
     let mut joined: Row = Vec::with_capacity(row.len());
     let mut whole: Row = Vec::new();
-    for own in row.chunk_by(|a, b| light_of(a.0) == light_of(b.0)) {
-        let light = light_of(own[0].0);
-        if own.len() > 1 && seems_small(input.lights, light, place) {
-            whole.push((samples + light, own.iter().map(|(_, share)| share).sum()));
-        } else {
-            joined.extend_from_slice(own);
+    for own in row.chunk_by(|a, b| input.light_of(a.0) == input.light_of(b.0)) {
+        match input
+            .light_of(own[0].0)
+            .filter(|&light| own.len() > 1 && seems_small(input.lights, light, place))
+        {
+            Some(light) => whole.push((samples + light, own.iter().map(|(_, share)| share).sum())),
+            None => joined.extend_from_slice(own),
         }
     }
     joined.extend(whole);
+    joined.sort_unstable_by_key(|(source, _)| *source);
     joined
 }
 

@@ -7,7 +7,8 @@ use crate::grid::{Grid, Leaf, MOST_PROBES, Probe};
 /// How far a frame's axes may be from unit length and from each other's plane.
 const FRAME_SLACK: f32 = 1e-3;
 
-pub(super) fn grid(grid: &Grid, lights: usize, samples: usize, issues: &mut Issues) {
+pub(super) fn grid(grid: &Grid, lights: usize, sample_starts: &[u32], issues: &mut Issues) {
+    let samples = sample_starts.last().copied().unwrap_or(0) as usize;
     let positive = grid.origin.is_finite() && grid.cell_size.is_finite() && grid.cell_size > 0.0;
     issues.check(positive, Code::VlmNumber, "/grid", || {
         String::from("origin or cell size is not finite, or no cell has a size")
@@ -21,9 +22,16 @@ pub(super) fn grid(grid: &Grid, lights: usize, samples: usize, issues: &mut Issu
         "there is no such probe",
         |&probe| (probe as usize) < grid.probes.len(),
     );
-    issues.check_all(&grid.near, Code::VlmIndex, "/grid/near", "there is no such light", |near| {
-        (near.light() as usize) < lights
+    issues.check_all(&grid.near, Code::VlmIndex, "/grid/near", "there is no such light", |&near| {
+        (near as usize) < lights
     });
+    issues.check_all(
+        &grid.near_form_factors,
+        Code::VlmNumber,
+        "/grid/near_form_factors",
+        "not a number above 0",
+        |form_factor| form_factor.is_finite() && *form_factor > 0.0,
+    );
     issues.check_all(
         &grid.probes,
         Code::VlmNumber,
@@ -38,7 +46,7 @@ pub(super) fn grid(grid: &Grid, lights: usize, samples: usize, issues: &mut Issu
         || format!("{} of {} probes", grid.surface_probes, grid.probes.len()),
     );
     sources(grid, lights, samples, issues);
-    rows(grid, lights + samples, issues);
+    rows(grid, lights + samples + grid.uncovered.len(), sample_starts, issues);
 }
 
 /// Every cell leads to a leaf, to a later group of eight that exists, or nowhere; so descending ends.
@@ -95,13 +103,16 @@ fn leaves(grid: &Grid, issues: &mut Issues) {
 
 fn sound(probe: &Probe) -> bool {
     let reaches = [probe.reach_up, probe.reach_down].into_iter().chain(probe.reach);
-    let unit = |v: glam::Vec3| (v.length() - 1.0).abs() < FRAME_SLACK;
     probe.position.is_finite()
         && probe.row_scale.is_finite()
-        && unit(probe.normal)
-        && unit(probe.tangent)
+        && is_unit(probe.normal)
+        && is_unit(probe.tangent)
         && probe.normal.dot(probe.tangent).abs() < FRAME_SLACK
         && reaches.into_iter().all(|reach| reach.is_finite() && reach > 0.0)
+}
+
+fn is_unit(v: glam::Vec3) -> bool {
+    (v.length() - 1.0).abs() < FRAME_SLACK
 }
 
 fn sources(grid: &Grid, lights: usize, samples: usize, issues: &mut Issues) {
@@ -127,26 +138,45 @@ fn sources(grid: &Grid, lights: usize, samples: usize, issues: &mut Issues) {
         "not a number of 0 or more",
         |gain| gain.is_finite() && *gain >= 0.0,
     );
+    issues.check_all(
+        &grid.uncovered,
+        Code::VlmNumber,
+        "/grid/uncovered",
+        "its place or normal is broken, or a colour or its area is negative",
+        |piece| {
+            let numbers = [piece.reflectance, piece.emission];
+            piece.position.is_finite()
+                && is_unit(piece.normal)
+                && numbers.into_iter().all(|colour| colour.is_finite() && colour.min_element() >= 0.0)
+                && piece.area.is_finite()
+                && piece.area >= 0.0
+        },
+    );
 }
 
-fn rows(grid: &Grid, sources: usize, issues: &mut Issues) {
+fn rows(grid: &Grid, sources: usize, sample_starts: &[u32], issues: &mut Issues) {
     let fits = grid.near_starts.len() == grid.probes.len() + 1;
     issues.check(fits, Code::VlmLength, "/grid/near_starts", || {
         format!("{} offsets for {} probes", grid.near_starts.len(), grid.probes.len())
     });
+    let fits = grid.near_form_factors.len() == grid.near.len();
+    issues.check(fits, Code::VlmLength, "/grid/near_form_factors", || {
+        format!("{} form factors for {} near lights", grid.near_form_factors.len(), grid.near.len())
+    });
     check_starts(&grid.near_starts, grid.near.len(), "/grid/near_starts", issues);
     let ascends = |range: &[u32]| {
         let list = grid.near.get(range[0] as usize..range[1] as usize).unwrap_or(&[]);
-        list.is_sorted_by(|a, b| a.light() < b.light())
+        list.is_sorted_by(|a, b| a < b)
     };
     if let Some(probe) = grid.near_starts.windows(2).position(|range| !ascends(range)) {
         issues.check(false, Code::VlmOrder, &format!("/grid/near/{probe}"), || {
             String::from("the probe's near lights are not ascending")
         });
     }
-    let fits = grid.row_starts.len() == grid.probes.len() + 1;
+    let fits = grid.row_starts.len() == grid.probes.len() + grid.near.len() + 1;
     issues.check(fits, Code::VlmLength, "/grid/row_starts", || {
-        format!("{} offsets for {} probes", grid.row_starts.len(), grid.probes.len())
+        let (probes, near) = (grid.probes.len(), grid.near.len());
+        format!("{} offsets for {probes} probes and {near} near lights", grid.row_starts.len())
     });
     let entries = grid.row_starts.last().copied().unwrap_or(0) as usize;
     check_starts(&grid.row_starts, entries, "/grid/row_starts", issues);
@@ -158,8 +188,15 @@ fn rows(grid: &Grid, sources: usize, issues: &mut Issues) {
         return;
     }
     let known = |probe: &usize| grid.row(*probe).all(|(source, _)| (source as usize) < sources);
-    if let Some(probe) = (0..grid.probes.len()).find(|probe| !known(probe)) {
-        issues.check(false, Code::VlmIndex, &format!("/grid/rows/{probe}"), || {
+    let known_near = |near: &usize| {
+        let first = grid.near.get(*near).and_then(|&light| sample_starts.get(light as usize));
+        first.is_some_and(|&first| grid.near_row(*near, first).all(|(source, _)| (source as usize) < sources))
+    };
+    let probes = grid.probes.len();
+    let unknown = (0..probes).find(|probe| !known(probe));
+    let unknown = unknown.or_else(|| Some(probes + (0..grid.near.len()).find(|near| !known_near(near))?));
+    if let Some(row) = unknown {
+        issues.check(false, Code::VlmIndex, &format!("/grid/rows/{row}"), || {
             String::from("it names a source that does not exist")
         });
     }
@@ -172,12 +209,13 @@ pub(super) mod tests {
     use super::super::tests::Break;
     use super::*;
     use crate::asset::VlmAsset;
-    use crate::grid::{NearLight, RowWriter};
+    use crate::grid::{RowWriter, Uncovered};
 
     /// One cell over two lights, with one probe that knows both.
     pub fn two_lights() -> Grid {
         let mut rows = RowWriter::default();
-        rows.push([(1, 255)]);
+        rows.push(0, [(1, 255)]);
+        rows.push(0, [(0, 128)]);
         Grid {
             cell_size: 1.0,
             dimensions: [1, 1, 1],
@@ -185,7 +223,8 @@ pub(super) mod tests {
             leaves: vec![Leaf { probes: 0, free_probes: 1 }, Leaf { probes: 1, free_probes: 1 }],
             leaf_probes: vec![0],
             near_starts: vec![0, 1],
-            near: vec![NearLight::new(0, 128)],
+            near: vec![0],
+            near_form_factors: vec![0.5],
             probes: vec![Probe {
                 normal: Vec3::Y,
                 tangent: Vec3::X,
@@ -198,6 +237,7 @@ pub(super) mod tests {
             surface_probes: 1,
             sample_shares: vec![1.0; 2],
             surface_gains: vec![1.0; 2],
+            uncovered: vec![Uncovered { normal: Vec3::Y, ..Uncovered::default() }],
             row_starts: rows.starts,
             rows: rows.words,
             ..Grid::default()
@@ -234,7 +274,10 @@ pub(super) mod tests {
             grid(a).leaves = [0, most + 1].map(|probes| Leaf { probes, free_probes: most + 1 }).into();
         }),
         (Code::VlmIndex, "/grid/leaf_probes/0", |a| grid(a).leaf_probes[0] = 1),
-        (Code::VlmIndex, "/grid/near/0", |a| grid(a).near[0] = NearLight::new(2, 128)),
+        (Code::VlmIndex, "/grid/near/0", |a| grid(a).near[0] = 2),
+        (Code::VlmNumber, "/grid/near_form_factors/0", |a| grid(a).near_form_factors[0] = 0.0),
+        (Code::VlmNumber, "/grid/near_form_factors/0", |a| grid(a).near_form_factors[0] = f32::NAN),
+        (Code::VlmLength, "/grid/near_form_factors", |a| grid(a).near_form_factors.push(0.5)),
         (Code::VlmNumber, "/grid/probes/0", |a| grid(a).probes[0].position.x = f32::INFINITY),
         (Code::VlmNumber, "/grid/probes/0", |a| grid(a).probes[0].row_scale = f32::NAN),
         (Code::VlmNumber, "/grid/probes/0", |a| grid(a).probes[0].normal *= 1.01),
@@ -246,12 +289,10 @@ pub(super) mod tests {
         (Code::VlmRange, "/grid/leaves/0", |a| grid(a).surface_probes = 0),
         (Code::VlmRange, "/grid/leaves/0", |a| grid(a).leaves[0].free_probes = 0),
         (Code::VlmOrder, "/grid/near/0", |a| {
-            grid(a).near = [1, 0].map(|light| NearLight::new(light, 128)).into();
-            grid(a).near_starts[1] = 2;
+            set_near(grid(a), [1, 0]);
         }),
         (Code::VlmOrder, "/grid/near/0", |a| {
-            grid(a).near = [0, 0].map(|light| NearLight::new(light, 128)).into();
-            grid(a).near_starts[1] = 2;
+            set_near(grid(a), [0, 0]);
         }),
         (Code::VlmRange, "/grid/surface_probes", |a| grid(a).surface_probes = 2),
         (Code::VlmLength, "/grid/sample_shares", |a| grid(a).sample_shares.push(1.0)),
@@ -260,6 +301,11 @@ pub(super) mod tests {
         (Code::VlmNumber, "/grid/sample_shares/1", |a| grid(a).sample_shares[1] = f32::INFINITY),
         (Code::VlmNumber, "/grid/surface_gains/0", |a| grid(a).surface_gains[0] = -1.0),
         (Code::VlmNumber, "/grid/surface_gains/0", |a| grid(a).surface_gains[0] = f32::INFINITY),
+        (Code::VlmNumber, "/grid/uncovered/0", |a| grid(a).uncovered[0].position.x = f32::NAN),
+        (Code::VlmNumber, "/grid/uncovered/0", |a| grid(a).uncovered[0].normal = Vec3::ZERO),
+        (Code::VlmNumber, "/grid/uncovered/0", |a| grid(a).uncovered[0].reflectance.y = -1.0),
+        (Code::VlmNumber, "/grid/uncovered/0", |a| grid(a).uncovered[0].emission.z = f32::INFINITY),
+        (Code::VlmNumber, "/grid/uncovered/0", |a| grid(a).uncovered[0].area = -1.0),
         (Code::VlmLength, "/grid/near_starts", |a| grid(a).near_starts.insert(0, 0)),
         (Code::VlmOrder, "/grid/near_starts", |a| grid(a).near_starts[1] = 0),
         (Code::VlmOrder, "/grid/near_starts", |a| grid(a).near_starts[0] = 1),
@@ -267,7 +313,8 @@ pub(super) mod tests {
         (Code::VlmOrder, "/grid/row_starts", |a| grid(a).row_starts[0] = 1),
         (Code::VlmLength, "/grid/rows", |a| grid(a).rows.push(0)),
         (Code::VlmLength, "/grid/rows", |a| grid(a).row_starts[1] = 3),
-        (Code::VlmIndex, "/grid/rows/0", |a| set_row(grid(a), 4)),
+        (Code::VlmIndex, "/grid/rows/0", |a| set_rows(grid(a), 5, 0)),
+        (Code::VlmIndex, "/grid/rows/1", |a| set_rows(grid(a), 0, 5)),
     ];
 
     fn grid(asset: &mut VlmAsset) -> &mut Grid {
@@ -281,9 +328,18 @@ pub(super) mod tests {
         &mut grid.cells
     }
 
-    fn set_row(grid: &mut Grid, source: u32) {
+    fn set_near(grid: &mut Grid, lights: [u32; 2]) {
+        grid.near = lights.into();
+        grid.near_form_factors = vec![0.5; 2];
+        grid.near_starts[1] = 2;
+        grid.row_starts.push(grid.row_starts[2]);
+    }
+
+    /// Each row has one source.
+    fn set_rows(grid: &mut Grid, of_probe: u32, of_near: u32) {
         let mut rows = RowWriter::default();
-        rows.push([(source, 1)]);
+        rows.push(0, [(of_probe, 1)]);
+        rows.push(0, [(of_near, 1)]);
         (grid.row_starts, grid.rows) = (rows.starts, rows.words);
     }
 
@@ -291,9 +347,9 @@ pub(super) mod tests {
     fn the_last_source_and_a_divided_cell_are_valid() {
         let mut valid = two_lights();
         divide(&mut valid);
-        set_row(&mut valid, 3);
+        set_rows(&mut valid, 4, 4);
         let mut issues = Issues::default();
-        super::grid(&valid, 2, 2, &mut issues);
+        super::grid(&valid, 2, &[0, 1, 2], &mut issues);
         assert_eq!(issues.0, []);
     }
 }

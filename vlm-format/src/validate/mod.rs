@@ -36,7 +36,7 @@ pub fn validate(asset: &VlmAsset) -> Vec<Issue> {
         tags::tags(asset, &mut issues);
         settings(asset, &mut issues);
         if let Some(grid) = &asset.grid {
-            grid::grid(grid, asset.triangles.len(), asset.samples.len(), &mut issues);
+            grid::grid(grid, asset.triangles.len(), &asset.sample_starts, &mut issues);
         }
     }
     issues.0

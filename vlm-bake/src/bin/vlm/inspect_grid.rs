@@ -54,7 +54,7 @@ impl GridContent {
         let lists: Vec<&[u32]> = grid.leaves.windows(2).map(|leaf| list(grid, leaf)).collect();
         let near = |list: &&[u32]| {
             let near = list.iter().flat_map(|&probe| grid.near_of(probe as usize));
-            let mut lights: Vec<u32> = near.map(|near| near.light()).collect();
+            let mut lights: Vec<u32> = near.copied().collect();
             lights.sort_unstable();
             lights.dedup();
             lights.len()
@@ -73,7 +73,7 @@ impl GridContent {
             free_probes: grid.probes.len().saturating_sub(grid.surface_probes as usize),
             listed_probes: grid.leaf_probes.len(),
             near_entries: grid.near.len(),
-            far_entries: grid.row_starts.last().copied().unwrap_or(0),
+            far_entries: grid.row_starts.get(grid.probes.len()).copied().unwrap_or(0),
             mean_row: sources as f64 / grid.probes.len().max(1) as f64,
             bytes: grid.byte_len(),
             bytes_by_array: bytes_by_array.into(),
@@ -171,7 +171,6 @@ fn bars(bins: &[Bin]) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use vlm_format::NearLight;
 
     use super::*;
 
@@ -203,12 +202,11 @@ mod tests {
 
     #[test]
     fn a_light_that_is_near_for_two_probes_of_a_leaf_counts_once() {
-        let near = [(3, 9), (4, 9), (3, 7)].map(|(light, seen)| NearLight::new(light, seen));
         let grid = Grid {
             leaves: vec![Leaf { probes: 0, free_probes: 2 }, Leaf { probes: 2, free_probes: 2 }],
             leaf_probes: vec![0, 1],
             near_starts: vec![0, 2, 3],
-            near: near.into(),
+            near: vec![3, 4, 3],
             ..Grid::default()
         };
         let last = GridContent::of(&grid).near_lights_of_leaves.pop();
