@@ -119,6 +119,10 @@ pub fn measure(
         };
         let by_lights = if options.lights_spp > 0 {
             let image = traced_by_lights(&trace, &view, &baked, options.lights_spp)?;
+            if let Some(folder) = &options.pictures {
+                let path = folder.join(format!("{name}_{}_lights.png", camera.name));
+                write_error(&path, options.size, &image, &truth.irradiance)?;
+            }
             Some(compare(&image))
         } else {
             None

@@ -72,7 +72,7 @@ impl BakeOptions {
         let lights = preset.lights(visible_triangles);
         let (samples, probes_per_light, rays, near) = match preset {
             Preset::Draft => (2, 1.5, 256, 0),
-            Preset::Game => (4, 3.0, 1024, 16),
+            Preset::Game => (4, 3.0, 512, 16),
             Preset::Quality => (16, 2.0, 2048, 40),
         };
         let probes = (f64::from(lights) * probes_per_light) as u32;

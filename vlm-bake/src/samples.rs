@@ -102,8 +102,11 @@ pub struct Sources<'a> {
     pub standing: &'a Lists,
 }
 
-/// A light much larger than the mean has at most this many times as many samples, one much smaller at least one over it.
-const MOST_SAMPLES_SHARE: f64 = 4.0;
+/// A light much larger than the mean has at most this many times as many samples. Higher values follow shadows that fall on large lights.
+const MOST_SAMPLES_SHARE: f64 = 64.0;
+
+/// A light much smaller than the mean has at least this share of samples.
+const LEAST_SAMPLES_SHARE: f64 = 0.25;
 
 /// The finished lights, each with about `count` samples: more where it is larger than the mean, fewer where it is smaller. Lights without any surface are left out.
 #[must_use]
@@ -118,7 +121,7 @@ pub fn samples(sources: &Sources, lights: &[Light], count: u32) -> Vec<BakedLigh
     }
     let mean_area = lights.iter().map(Light::area).sum::<f64>() / lights.len().max(1) as f64;
     let finish = |(l, light): (usize, &Light)| {
-        let share = (light.area() / mean_area).clamp(1.0 / MOST_SAMPLES_SHARE, MOST_SAMPLES_SHARE);
+        let share = (light.area() / mean_area).clamp(LEAST_SAMPLES_SHARE, MOST_SAMPLES_SHARE);
         let count = (f64::from(count) * share).ceil() as usize;
         let [surface, made] = areas[&sources.group[l]];
         let ratio = (surface / made).min(MOST_AREA_RATIO) as f32;
