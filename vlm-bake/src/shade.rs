@@ -121,6 +121,24 @@ impl<'a> TraceScene<'a> {
     /// shows, and no light comes from behind the geometric normal.
     #[must_use]
     pub fn direct_irradiance(&self, position: Vec3, normal: Vec3, geometric_normal: Vec3) -> Vec3 {
+        self.irradiance_by(&self.lights, position, normal, geometric_normal)
+    }
+
+    /// The punctual lights of the scene, in world space.
+    #[must_use]
+    pub fn lights(&self) -> &[punctual::PunctualLight] {
+        &self.lights
+    }
+
+    /// [`TraceScene::direct_irradiance`] by other lights.
+    #[must_use]
+    pub fn irradiance_by(
+        &self,
+        lights: &[punctual::PunctualLight],
+        position: Vec3,
+        normal: Vec3,
+        geometric_normal: Vec3,
+    ) -> Vec3 {
         let origin = self.bvh.leave(position, geometric_normal);
         let arriving = |light: &punctual::PunctualLight| {
             let incident = light.incident(position)?;
@@ -135,7 +153,7 @@ impl<'a> TraceScene<'a> {
             };
             visible.then_some(incident.facing_irradiance * cosine)
         };
-        self.lights.iter().filter_map(arriving).sum()
+        lights.iter().filter_map(arriving).sum()
     }
 
     /// Radiosity of a surface point by direct light alone, lx: `albedo * E`.

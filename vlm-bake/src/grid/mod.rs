@@ -12,6 +12,7 @@ mod made_lights;
 mod near;
 mod pool;
 mod reach;
+mod refine;
 mod spacing;
 mod stand_in;
 mod transport;
@@ -27,8 +28,9 @@ use vlm_format::{Grid, Probe, RowWriter, Uncovered};
 use vlm_shaders::cpu::upload::LightSet;
 
 use self::near::NearLight;
+use self::pool::Place;
 use self::transport::Row;
-use crate::progress::Progress;
+use crate::progress::{Progress, Silent};
 use crate::scene::Scene;
 use crate::shade::TraceScene;
 
@@ -84,15 +86,38 @@ pub fn grid(input: &GridInput, options: &GridOptions, progress: &dyn Progress) -
     if input.lights.is_empty() || options.probes == 0 {
         return None;
     }
-    let pool = pool::pool(input.trace, options.probes);
-    let spacing = spacing::Spacing::new(&pool, bounds, options.probes);
-    let mut chosen = spacing.spread(&pool, 0..pool.len() as u32, 1.0);
-    let mut probes = reach::probes(input.trace, &pool, &spacing, &chosen);
+    let mut pool = pool::pool(input.trace, options.probes);
+    let rough = GridOptions {
+        probes: (options.probes as f32 * ROUGH_PROBES) as u32,
+        rays: (options.rays as f32 * ROUGH_RAYS) as u32,
+        ..*options
+    };
+    progress.begin("rough grid", 1);
+    let rough = built(input, &pool, bounds, &rough, &Silent);
+    refine::refine(input, &mut pool, &rough);
+    Some(built(input, &pool, bounds, options, progress))
+}
+
+/// Share of the probes and rays for the grid that tells where probes should lie closer.
+const ROUGH_PROBES: f32 = 0.5;
+const ROUGH_RAYS: f32 = 0.25;
+
+/// The grid whose probes' spacing follows the openness of the pool.
+fn built(
+    input: &GridInput,
+    pool: &[Place],
+    bounds: [DVec3; 2],
+    options: &GridOptions,
+    progress: &dyn Progress,
+) -> Grid {
+    let spacing = spacing::Spacing::new(pool, bounds, options.probes);
+    let mut chosen = spacing.spread(pool, 0..pool.len() as u32, 1.0);
+    let mut probes = reach::probes(input.trace, pool, &spacing, &chosen);
     for share in COVERING {
         let cells = tree::tree(input.trace.scene, bounds, &probes, options.cell_size);
-        let missed = tree::uncovered(&cells, &pool);
-        let more = spacing.spread(&pool, missed, share);
-        probes.extend(reach::probes(input.trace, &pool, &spacing, &more));
+        let missed = tree::uncovered(&cells, pool);
+        let more = spacing.spread(pool, missed, share);
+        probes.extend(reach::probes(input.trace, pool, &spacing, &more));
         chosen.extend(more);
     }
     let places: Vec<_> = chosen.iter().map(|&i| pool[i as usize]).collect();
@@ -104,7 +129,7 @@ pub fn grid(input: &GridInput, options: &GridOptions, progress: &dyn Progress) -
     grid.sample_shares = input.shares.to_vec();
     grid.surface_gains = input.gains.to_vec();
     grid.uncovered = input.uncovered.to_vec();
-    Some(grid)
+    grid
 }
 
 /// The cells of the box between two, both included, x fastest.
