@@ -53,7 +53,7 @@ macro_rules! layout_of {
                 field_size(|twin: &$twin| &twin.$field),
             )),*],
             size: size_of::<$twin>(),
-            strides: vec![size_of::<$twin>(); $in_arrays],
+            strides: (0..$in_arrays).map(|_| size_of::<$twin>()).collect(),
         }
     };
 }
