@@ -5,4 +5,5 @@
 #![warn(clippy::expect_used, clippy::panic, clippy::unreachable, clippy::todo)]
 
 pub mod cpu;
+pub mod tables;
 pub mod wgsl;

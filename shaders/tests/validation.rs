@@ -1,22 +1,22 @@
-//! Every shader parses and validates without a GPU, and the shared structs have the layout of their Rust twins.
+//! Every shader parses, validates and keeps within WebGPU's default limits, without a GPU.
 
-use std::mem::{offset_of, size_of};
-
-use naga::valid::{Capabilities, ValidationFlags, Validator};
-use vlm_shaders::cpu::form_factor::LightGeometry;
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use vlm_shaders::wgsl;
 
-fn parse(source: &str) -> Result<naga::Module, String> {
+/// Storage buffers per stage by WebGPU's default limits.
+const MOST_STORAGE_BUFFERS: usize = 8;
+
+fn parse(source: &str) -> Result<(naga::Module, ModuleInfo), String> {
     let module = naga::front::wgsl::parse_str(source).map_err(|error| error.emit_to_string(source))?;
     let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
-    validator.validate(&module).map_err(|error| format!("{error:?}"))?;
-    Ok(module)
+    let info = validator.validate(&module).map_err(|error| format!("{error:?}"))?;
+    Ok((module, info))
 }
 
 #[test]
 fn every_shader_validates() {
-    for source in [wgsl::form_factor_cases(), wgsl::form_factor_sums()] {
-        parse(&source).unwrap_or_else(|error| panic!("{error}"));
+    for (name, source) in wgsl::all() {
+        parse(&source).unwrap_or_else(|error| panic!("{name}: {error}"));
     }
     assert!(
         parse(&wgsl::form_factor_cases().replace("let cut_b", "let cut_d")).is_err(),
@@ -27,52 +27,38 @@ fn every_shader_validates() {
 #[test]
 fn no_built_in_inverse_trigonometry() {
     for name in ["acos(", "asin(", "atan(", "atan2("] {
-        for source in [wgsl::form_factor_cases(), wgsl::form_factor_sums()] {
-            assert!(!source.contains(name), "{name} errs by up to 4096 ulp in WGSL");
+        for (shader, source) in wgsl::all() {
+            assert!(!source.contains(name), "{shader}: {name} errs by up to 4096 ulp in WGSL");
         }
     }
 }
 
-/// Names and offsets of a shader's `LightGeometry`, and its size.
-fn layout(source: &str) -> (Vec<(String, usize)>, usize) {
-    let module = parse(source).unwrap_or_else(|error| panic!("{error}"));
-    let (_, light) =
-        module.types.iter().find(|(_, t)| t.name.as_deref() == Some("LightGeometry")).expect("the struct");
-    let naga::TypeInner::Struct { members, span } = &light.inner else { panic!("not a struct") };
-    let member = |m: &naga::StructMember| (m.name.clone().unwrap_or_default(), m.offset as usize);
-    (members.iter().map(member).collect(), *span as usize)
+/// The storage buffers that the only entry point of a shader uses, as group and binding.
+fn storage_buffers(source: &str) -> Vec<(u32, u32)> {
+    let (module, info) = parse(source).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(module.entry_points.len(), 1);
+    let used = info.get_entry_point(0);
+    let buffer = |(handle, variable): (naga::Handle<naga::GlobalVariable>, &naga::GlobalVariable)| {
+        let is_used = !used[handle].is_empty();
+        let is_storage = matches!(variable.space, naga::AddressSpace::Storage { .. });
+        let place = variable.binding.filter(|_| is_used && is_storage)?;
+        Some((place.group, place.binding))
+    };
+    module.global_variables.iter().filter_map(buffer).collect()
 }
 
 #[test]
-fn light_geometry_has_the_layout_of_its_mirror() {
-    macro_rules! offsets {
-        ($($field:ident),*) => { vec![$((stringify!($field).to_owned(), offset_of!(LightGeometry, $field))),*] };
+fn passes_keep_within_the_default_limits() {
+    for (name, source) in wgsl::all() {
+        let mut buffers = storage_buffers(&source);
+        assert!(buffers.len() <= MOST_STORAGE_BUFFERS, "{name}: {buffers:?}");
+        assert!(buffers.len() > 2 && buffers.iter().all(|(group, _)| *group < 4), "{name}: {buffers:?}");
+        buffers.sort_unstable();
+        buffers.dedup();
+        assert_eq!(buffers.len(), storage_buffers(&source).len(), "{name}: one binding, one buffer");
     }
-    let expected = offsets!(
-        v0,
-        scale,
-        base,
-        before,
-        altitude,
-        after,
-        normal,
-        altitude_squared,
-        v1,
-        base_squared,
-        v2,
-        padding
-    );
-    assert_eq!(layout(&wgsl::form_factor_cases()), (expected, size_of::<LightGeometry>()));
-}
-
-#[test]
-fn a_rename_a_swap_and_a_dropped_field_are_seen() {
-    let source = "struct LightGeometry { v0: vec3f, scale: f32, base: vec3f, before: f32 }
-        @group(0) @binding(0) var<uniform> light: LightGeometry;";
-    let right = layout(source);
-    for (from, to) in
-        [("scale", "scales"), ("v0: vec3f, scale: f32", "scale: f32, v0: vec3f"), (", before: f32", "")]
-    {
-        assert_ne!(layout(&source.replace(from, to)), right, "{from} -> {to}");
-    }
+    let one_more = wgsl::refresh()
+        .replace("irradiance * (row_scale", "f32(more[0]) * irradiance * (row_scale")
+        + "@group(2) @binding(0) var<storage, read> more: array<u32>;";
+    assert_eq!(storage_buffers(&one_more).len(), 9, "the check can fail");
 }

@@ -71,6 +71,9 @@ pub enum BakeError {
         /// The budget.
         asked: u32,
     },
+    /// [`Progress::is_cancelled`] said so.
+    #[error("the bake was cancelled")]
+    Cancelled,
 }
 
 /// Bakes the Virtual Light Meshes of a scene. The result depends on the scene and the options alone, not on the number of
@@ -78,21 +81,21 @@ pub enum BakeError {
 ///
 /// # Errors
 /// [`BakeError::NothingReflects`] if no surface makes lights and no artist made any; [`BakeError::NothingLeft`] if the
-/// budget leaves none.
+/// budget leaves none; [`BakeError::Cancelled`] soon after `progress` is.
 pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Result<Bake, BakeError> {
     let mut clock = Clock::new(progress);
 
-    clock.stage("patches");
+    clock.stage("patches")?;
     let surfaces = scene.triangle_surfaces();
     let patches = patches(scene, &surfaces, options.lights);
     if patches.triangles.is_empty() && scene.authored.is_empty() {
         return Err(BakeError::NothingReflects);
     }
 
-    clock.stage("decimate");
+    clock.stage("decimate")?;
     let (mesh, decimation) = decimate(&patches, options);
 
-    clock.stage("mend");
+    clock.stage("mend")?;
     let ground = Ground::new(scene, &patches);
     let coarse = mesh.lights();
     let points = ground.points(options.lights as usize);
@@ -100,17 +103,17 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let light_of_point = Correspondence::new(&ground, &coarse, |_| true).of(&fewer);
     let distance = measured_distance(&fewer, &light_of_point, &coarse);
     let deepest = deepest(ground.clearance, distance.mean_m, decimation.error_m);
-    let around = Surroundings { ground: &ground, deepest };
+    let around = Surroundings { ground: &ground, deepest, progress };
     let snap = Snap::new(&patches);
     let density = densities(scene, &patches, &mesh, &points_of_lights(&light_of_point, coarse.len()));
     let budget = (options.lights as usize).saturating_sub(authored::count(scene));
     let mut hidden = mend(scene, Refiner::new(mesh, density, &snap), budget, &around, &points);
 
-    clock.stage("verify");
+    clock.stage("verify")?;
     let lights = &hidden.lights;
     let violations = std::mem::take(&mut hidden.violations);
 
-    clock.stage("samples");
+    clock.stage("samples")?;
     let accused = accusations(&patches, lights, violations);
     let standing = points_of_lights(&hidden.light_of_point, lights.len());
     let sources = Sources {
@@ -126,7 +129,7 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let flux = conserve(scene, &patches, &surfaces, &points, &mut baked);
     steer(scene, &mut baked);
 
-    clock.stage("authored");
+    clock.stage("authored")?;
     authored::merge(scene, &mut baked, options, ground.clearance);
     let authored_before = authored_lights(&baked);
     baked.retain(|light| placeable(scene, light));
@@ -136,10 +139,10 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
         return Err(BakeError::NothingLeft { asked: options.lights });
     }
 
-    clock.stage("tag");
+    clock.stage("tag")?;
     let (mut asset, tags, proof) = prove(scene, &mut baked, options, &ground, points);
 
-    clock.stage("grid");
+    clock.stage("grid")?;
     let uncovered = uncovered(scene, &patches, &proof, &baked);
     let stand_ins = StandIns::new(scene, &ground, &baked, &uncovered);
     let sources = GridSources { baked: &baked, stand_ins: &stand_ins, uncovered: &uncovered };
@@ -163,7 +166,7 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
         ..Report::default()
     };
     report.missed_because = why_missed(&report, options);
-    report.seconds = clock.finish();
+    report.seconds = clock.finish()?;
     Ok(Bake { asset, stand_ins, report })
 }
 
@@ -336,21 +339,29 @@ impl<'a> Clock<'a> {
         Self { progress, running: None, seconds: BTreeMap::new() }
     }
 
-    fn stage(&mut self, name: &'static str) {
-        self.stop();
+    fn stage(&mut self, name: &'static str) -> Result<(), BakeError> {
+        self.stop()?;
         self.progress.begin(name, 1);
         self.running = Some((name, Instant::now()));
+        self.go_on()
     }
 
-    fn stop(&mut self) {
+    /// What a cancelled stage leaves is not whole, so nothing may look at it.
+    fn go_on(&self) -> Result<(), BakeError> {
+        if self.progress.is_cancelled() { Err(BakeError::Cancelled) } else { Ok(()) }
+    }
+
+    fn stop(&mut self) -> Result<(), BakeError> {
+        self.go_on()?;
         if let Some((name, start)) = self.running.take() {
             self.progress.advance(1);
             self.seconds.insert(name, start.elapsed().as_secs_f64());
         }
+        Ok(())
     }
 
-    fn finish(mut self) -> BTreeMap<&'static str, f64> {
-        self.stop();
-        self.seconds
+    fn finish(mut self) -> Result<BTreeMap<&'static str, f64>, BakeError> {
+        self.stop()?;
+        Ok(self.seconds)
     }
 }

@@ -58,6 +58,9 @@ impl<'a> Fitting<'a> {
         let mut doubtful: Vec<usize> = (0..self.lights.len()).collect();
         let mut refreshed = false;
         for round in 0..ROUNDS {
+            if self.around.progress.is_cancelled() {
+                break;
+            }
             self.judge(&doubtful);
             let fits = self.fits(&doubtful);
             for &(l, light) in &fits {
@@ -109,6 +112,9 @@ impl<'a> Fitting<'a> {
     fn fits(&self, some: &[usize]) -> Vec<(usize, Light)> {
         let evidence = self.evidence();
         let fit = |&l: &usize| {
+            if self.around.progress.is_cancelled() {
+                return None;
+            }
             let own = evidence.own_points(l);
             let curable = self.verdicts[l].is_some() && !own.is_empty() && !self.is_two_sided(l);
             let fitted = || fitted(&self.lights[l], &own, &evidence, self.around.deepest);

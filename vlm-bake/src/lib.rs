@@ -34,6 +34,7 @@ pub mod samples;
 pub mod flux;
 pub mod authored;
 pub mod grid;
+pub mod grid_content;
 pub mod neighbours;
 pub mod tag;
 pub mod tag_cost;

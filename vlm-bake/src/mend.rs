@@ -51,7 +51,7 @@ pub struct Hidden {
     pub violations: Vec<Violation>,
 }
 
-/// Refines to the budget and hides the lights from `points`.
+/// Refines to the budget and hides the lights from `points`. What is left where it was cancelled is not whole.
 #[must_use]
 pub fn mend(
     scene: &Scene,
@@ -68,7 +68,7 @@ pub fn mend(
     let mut judged = Vec::new();
     for _ in 0..ROUNDS {
         let room = budget.saturating_sub(refiner.lights());
-        if room == 0 {
+        if room == 0 || around.progress.is_cancelled() {
             break;
         }
         place(&refiner, around, &mut offset, &mut roughly);
@@ -84,6 +84,9 @@ pub fn mend(
         }
         cut(&mut refiner, &lights, failing, room);
         judged = lights;
+    }
+    if around.progress.is_cancelled() {
+        return Hidden::default();
     }
     refiner.to_budget(budget);
     let mut standing = Standing::new(points);

@@ -24,6 +24,7 @@ use crate::clearance::self_lighting;
 use crate::correspondence::Light;
 use crate::decimate::LightMesh;
 use crate::ground::Ground;
+use crate::progress::Progress;
 use crate::standing::Standing;
 use crate::surface::SurfacePoint;
 use crate::topology::Lists;
@@ -48,6 +49,8 @@ pub struct Surroundings<'a> {
     pub ground: &'a Ground<'a>,
     /// No vertex moves farther than this, metres; less where its edges are short.
     pub deepest: f64,
+    /// Rounds end early where it is cancelled; what they leave is of no use then.
+    pub progress: &'a dyn Progress,
 }
 
 /// One plane below which a vertex must lie.
@@ -94,6 +97,9 @@ impl Offset {
             Limits { deepest: deepest(&self.mesh, rest, around), objects: objects_of(&self.mesh, around) };
         let mut lists = Lists::default();
         for round in 0..ROUNDS {
+            if around.progress.is_cancelled() {
+                break;
+            }
             settle(&mut self.mesh, rest, &self.planes, &dirty, &limits, around);
             let lights = self.mesh.lights();
             if round % 2 == 0 {

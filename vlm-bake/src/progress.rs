@@ -6,6 +6,11 @@ pub trait Progress: Sync {
     fn begin(&self, stage: &'static str, length: u64);
     /// That many more steps are done.
     fn advance(&self, steps: u64);
+    /// True once the result is not wanted any more, and from then on. A bake asks between its stages and often within the long ones, so an
+    /// answer should cost no more than reading a flag.
+    fn is_cancelled(&self) -> bool {
+        false
+    }
 }
 
 /// Tells nobody.

@@ -5,8 +5,9 @@ use glam::Vec3;
 use super::form_factor::{Receivers, form_factor, form_factors, is_behind};
 use super::upload::LightSet;
 
-/// A shaded point.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A shaded point. 40 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Receiver {
     /// Metres, world space.
     pub position: Vec3,

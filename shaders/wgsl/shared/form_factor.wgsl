@@ -105,6 +105,12 @@ fn form_factor(light: LightGeometry, x: vec3f, n: vec3f) -> f32 {
     return close_whole(light, x, n);
 }
 
+// The whole light lies behind a surface through `x` with this normal.
+fn is_behind(light: LightGeometry, x: vec3f, surface_normal: vec3f) -> bool {
+    let r = (light.v0 - x) * light.scale;
+    return !any(heights(light, r, surface_normal).corners > vec3f(0.0));
+}
+
 fn close_whole(light: LightGeometry, x: vec3f, n: vec3f) -> f32 {
     return to_unit(whole_sum(light, corners_from(light, x), n) * -INVERSE_PI);
 }

@@ -6,24 +6,14 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use vlm_shaders::cpu::form_factor::{ErrorBound, LightGeometry};
 use vlm_shaders::wgsl;
-use wgpu::util::DeviceExt as _;
 
 use super::case::Case;
 use super::textbook::EdgeForm;
+use crate::gpu::Gpu;
+pub use crate::gpu::GpuError;
 
 /// Invocations per workgroup, as in the shader.
 const WORKGROUP: u32 = 64;
-
-/// Why there is nothing from the GPU.
-#[derive(Debug, thiserror::Error)]
-pub enum GpuError {
-    /// No Vulkan adapter, not even a software one.
-    #[error("no Vulkan adapter: install a driver (Debian: mesa-vulkan-drivers and libvulkan1): {0}")]
-    NoAdapter(String),
-    /// The adapter gives no device or lost it.
-    #[error("the GPU failed: {0}")]
-    Device(String),
-}
 
 /// A receiver, as the shader reads it.
 #[repr(C)]
@@ -54,8 +44,7 @@ pub struct GpuFormFactor {
     pub name: String,
     /// It runs on the processor.
     pub is_software: bool,
-    device: wgpu::Device,
-    queue: wgpu::Queue,
+    gpu: Gpu,
     pipeline: wgpu::ComputePipeline,
 }
 
@@ -85,28 +74,9 @@ impl GpuFormFactor {
     }
 
     fn with_shader(source: &str) -> Result<Self, GpuError> {
-        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-        descriptor.backends = wgpu::Backends::VULKAN;
-        let instance = wgpu::Instance::new(descriptor);
-        let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))
-            .map_err(|error| GpuError::NoAdapter(error.to_string()))?;
-        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default()))
-            .map_err(|error| GpuError::Device(error.to_string()))?;
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("form_factor_cases"),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
-        });
-        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some("form_factor_cases"),
-            layout: None,
-            module: &module,
-            entry_point: Some("main"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            cache: None,
-        });
-        let info = adapter.get_info();
-        let is_software = info.device_type == wgpu::DeviceType::Cpu;
-        Ok(Self { name: info.name, is_software, device, queue, pipeline })
+        let gpu = Gpu::new()?;
+        let pipeline = gpu.pipeline(source, "main");
+        Ok(Self { name: gpu.name.clone(), is_software: gpu.is_software, gpu, pipeline })
     }
 
     /// One exact form factor per case.
@@ -142,7 +112,7 @@ impl GpuFormFactor {
         let receivers: Vec<Receiver> = cases.iter().map(|case| Receiver::new(case.x, case.n)).collect();
         let task = self.upload(&lights, &receivers, Some(bound));
         self.submit(&task, 1);
-        self.read(&task.back)
+        self.gpu.read(&task.back)
     }
 
     /// The sums of all lights' form factors at each point, and pairs per second from submission to completion; only after
@@ -160,39 +130,31 @@ impl GpuFormFactor {
         let task = self.upload(lights, &receivers, None);
         // The first run compiles.
         self.submit(&task, 1);
-        self.wait()?;
+        self.gpu.wait()?;
         let start = Instant::now();
         self.submit(&task, ROUNDS);
-        self.wait()?;
+        self.gpu.wait()?;
         let pairs = f64::from(ROUNDS) * (lights.len() * points.len()) as f64;
         let rate = pairs / start.elapsed().as_secs_f64();
-        Ok((self.read(&task.back)?, rate))
+        Ok((self.gpu.read(&task.back)?, rate))
     }
 
     fn upload(&self, lights: &[LightGeometry], receivers: &[Receiver], bound: Option<&ErrorBound>) -> Task {
         let count = receivers.len() as u32;
         let size = 4 * u64::from(count);
-        let lights = self.input("lights", bytemuck::cast_slice(lights));
-        let receivers = self.input("receivers", bytemuck::cast_slice(receivers));
-        let results =
-            self.buffer("results", size, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
-        let back = self.buffer("back", size, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
-        let bound = bound.map(|bound| self.input("bound", bytemuck::bytes_of(bound)));
+        let gpu = &self.gpu;
+        let lights = gpu.input("lights", bytemuck::cast_slice(lights));
+        let receivers = gpu.input("receivers", bytemuck::cast_slice(receivers));
+        let results = gpu.buffer("results", size, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
+        let back = gpu.buffer("back", size, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
+        let bound = bound.map(|bound| gpu.input("bound", bytemuck::bytes_of(bound)));
         let bindings = [Some(&lights), Some(&receivers), Some(&results), bound.as_ref()];
-        let entries: Vec<_> = (0..)
-            .zip(bindings.into_iter().flatten())
-            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
-            .collect();
-        let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout: &self.pipeline.get_bind_group_layout(0),
-            entries: &entries,
-        });
+        let group = gpu.group(&self.pipeline, 0, &bindings.into_iter().flatten().collect::<Vec<_>>());
         Task { group, results, back, count }
     }
 
     fn submit(&self, task: &Task, rounds: u32) {
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         for _ in 0..rounds {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
             pass.set_pipeline(&self.pipeline);
@@ -200,34 +162,6 @@ impl GpuFormFactor {
             pass.dispatch_workgroups(task.count.div_ceil(WORKGROUP), 1, 1);
         }
         encoder.copy_buffer_to_buffer(&task.results, 0, &task.back, 0, task.back.size());
-        self.queue.submit([encoder.finish()]);
-    }
-
-    fn wait(&self) -> Result<(), GpuError> {
-        let wait = wgpu::PollType::Wait { submission_index: None, timeout: None };
-        self.device.poll(wait).map(|_| ()).map_err(|error| GpuError::Device(error.to_string()))
-    }
-
-    fn input(&self, label: &str, contents: &[u8]) -> wgpu::Buffer {
-        let usage = wgpu::BufferUsages::STORAGE;
-        self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some(label),
-            contents,
-            usage,
-        })
-    }
-
-    fn buffer(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
-        let descriptor =
-            wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
-        self.device.create_buffer(&descriptor)
-    }
-
-    fn read(&self, buffer: &wgpu::Buffer) -> Result<Vec<f32>, GpuError> {
-        let failed = |error: &dyn std::fmt::Display| GpuError::Device(error.to_string());
-        buffer.map_async(wgpu::MapMode::Read, .., |_| {});
-        self.wait()?;
-        let mapped = buffer.get_mapped_range(..).map_err(|error| failed(&error))?;
-        Ok(bytemuck::cast_slice(&mapped).to_vec())
+        self.gpu.queue.submit([encoder.finish()]);
     }
 }

@@ -114,6 +114,9 @@ fn built(
     let mut chosen = spacing.spread(pool, 0..pool.len() as u32, 1.0);
     let mut probes = reach::probes(input.trace, pool, &spacing, &chosen);
     for share in COVERING {
+        if progress.is_cancelled() {
+            return None;
+        }
         let cells = tree::tree(input.trace.scene, bounds, &probes, options.cell_size);
         let missed = tree::uncovered(&cells, pool);
         let more = spacing.spread(pool, missed, share);
@@ -123,6 +126,9 @@ fn built(
     let places: Vec<_> = chosen.iter().map(|&i| pool[i as usize]).collect();
     progress.begin("transport", places.len() as u64);
     let rows = transport::rows(input, &places, options.rays, progress);
+    if progress.is_cancelled() {
+        return None;
+    }
     let (near, far) = near::split(input, &places, &probes, rows, options);
     let cells = tree::tree(input.trace.scene, bounds, &probes, options.cell_size);
     let mut grid = encode(cells, probes, &near, &far, input.light_of_sample);

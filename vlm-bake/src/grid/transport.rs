@@ -22,6 +22,9 @@ const WHOLE: f32 = 0.2;
 pub fn rows(input: &GridInput, places: &[Place], rays: u32, progress: &dyn Progress) -> Vec<Row> {
     let made = made_lights::made_lights(input);
     let row = |(i, place): (usize, &Place)| {
+        if progress.is_cancelled() {
+            return Row::new();
+        }
         progress.advance(1);
         let row = transport(input.trace, input.stand_ins, &place.surface, rays, i as u64);
         let mut row = whole_lights(input, place, &row);

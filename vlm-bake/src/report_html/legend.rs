@@ -3,8 +3,8 @@
 use maud::{Markup, html};
 
 use super::colour::{HATCH, KEPT_DARK, MAKES_NONE, PLAIN, POKING, VIOLATION, css, of_tag, pale};
-use super::pictures::{CLEARANCE_END, Subject, css_ramp};
-use super::text::length;
+use super::pictures::{CLEARANCE_END, Scales, Subject, css_ramp};
+use super::text::{length, three_digits};
 
 /// Title and explanation.
 pub fn caption(subject: Subject) -> (&'static str, &'static str) {
@@ -33,11 +33,19 @@ pub fn caption(subject: Subject) -> (&'static str, &'static str) {
             "Albedo of the lights",
             "The colour of the light that stands there. It should be that of the surface, averaged.",
         ),
+        Subject::Probes => (
+            "Probes",
+            "Places where light is known, by how far they count along the surface. They should lie denser where light changes.",
+        ),
+        Subject::NearLights => (
+            "Near lights",
+            "How many lights a pixel evaluates by itself: what it costs. Dark grey surface is in no cell of the grid.",
+        ),
     }
 }
 
 /// The legend of a subject; empty where colours speak for themselves.
-pub fn legend(subject: Subject, required_m: f64, error_end_m: f64) -> Markup {
+pub fn legend(subject: Subject, required_m: f64, scales: &Scales) -> Markup {
     match subject {
         Subject::Violations => html! {
             (swatch(VIOLATION, "lights itself"))
@@ -53,7 +61,15 @@ pub fn legend(subject: Subject, required_m: f64, error_end_m: f64) -> Markup {
             }
         }
         Subject::Error => html! {
-            (scale(&[0.0, 0.5 * error_end_m, error_end_m].map(length)))
+            (scale(&[0.0, 0.5, 1.0].map(|share| length(share * scales.error_end_m))))
+        },
+        Subject::Probes => {
+            let [low, high] = scales.grid.reach_m;
+            scale(&[low, (low * high).sqrt(), high].map(length))
+        }
+        Subject::NearLights => html! {
+            (scale(&[0.0, 0.5, 1.0].map(|share| three_digits(share * scales.grid.near))))
+            (swatch(MAKES_NONE, "in no cell"))
         },
         Subject::Tags => html! {
             (swatch(PLAIN, "no tag"))

@@ -9,6 +9,7 @@ mod facts;
 mod views;
 mod colour;
 mod encode;
+mod grid_view;
 mod pictures;
 mod objects;
 mod text;
@@ -36,7 +37,7 @@ use facts::Evidence;
 use lights::WorldLights;
 use objects::{Grouping, ObjectFigures};
 use page::{CloseUp, Gallery, Page};
-use pictures::Subject;
+use pictures::{Scales, Subject};
 use places::WorstPlace;
 
 /// Size of the pictures, pixels. Larger ones show smaller lights and take more space.
@@ -83,7 +84,7 @@ pub fn report_html(subjects: &Subjects) -> Result<String, ImageError> {
     let lights = WorldLights::new(scene, asset);
     let checked = Checked::of(&verification, report);
     let evidence = Evidence::new(scene, asset, &lights, &ground, &verification);
-    let error_end_m = pictures::error_end(&evidence);
+    let scales = Scales::new(&evidence);
     let objects = objects::figures(&evidence, &surfaces, Grouping::Object);
     let parts = objects::figures(&evidence, &surfaces, Grouping::Part);
     let remedies = Remedies {
@@ -91,12 +92,12 @@ pub fn report_html(subjects: &Subjects) -> Result<String, ImageError> {
         more_lights: report.asked_lights.saturating_mul(2).min(MOST_LIGHTS),
         can_steer: objects.len() > 1,
     };
-    let places = places::worst_places(&evidence, error_end_m);
+    let places = places::worst_places(&evidence, scales.error_end_m);
     let summary = summary::summary(report, &checked, &objects, &places, &remedies);
     let galleries: Result<Vec<Gallery>, ImageError> =
         views::cameras(scene, f64::from(PICTURE[0]) / f64::from(PICTURE[1]))
             .iter()
-            .map(|camera| gallery(&evidence, camera, error_end_m))
+            .map(|camera| gallery(&evidence, camera, &scales))
             .collect();
     let close_ups: Result<Vec<CloseUp>, ImageError> =
         places.into_iter().map(|place| close_up(&evidence, place)).collect();
@@ -108,10 +109,11 @@ pub fn report_html(subjects: &Subjects) -> Result<String, ImageError> {
         size: PICTURE,
         close_ups: &close_ups?,
         remedies: &remedies,
-        error_end_m,
+        scales,
         visible_m2: checked.visible_m2,
         objects: object_tables(&objects, &parts),
         tags: tables::tag_table(&evidence, &report.tags),
+        grid: tables::grid_table(asset.grid.as_ref()),
         sizes: tables::size_table(asset, subjects.file_bytes),
         times: tables::time_table(&report.seconds),
         notes: &report.notes,
@@ -128,10 +130,13 @@ fn object_tables(objects: &[ObjectFigures], parts: &[ObjectFigures]) -> Markup {
     }
 }
 
-fn gallery(evidence: &Evidence, camera: &Camera, error_end_m: f64) -> Result<Gallery, ImageError> {
+fn gallery(evidence: &Evidence, camera: &Camera, scales: &Scales) -> Result<Gallery, ImageError> {
     let view = evidence.view(camera, PICTURE[0], PICTURE[1]);
-    let draw = |subject| encode::data_uri(&pictures::draw(evidence, &view, camera, subject, error_end_m));
-    let pictures: Result<Vec<String>, ImageError> = Subject::ALL.into_iter().map(draw).collect();
+    let draw = |&subject: &Subject| {
+        let picture = pictures::draw(evidence, &view, camera, subject, scales);
+        Ok((subject, encode::data_uri(&picture)?))
+    };
+    let pictures: Result<_, ImageError> = Subject::of(evidence.asset).iter().map(draw).collect();
     Ok(Gallery { camera: camera.name.clone(), pictures: pictures? })
 }
 

@@ -4,18 +4,18 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::advice::Remedies;
 use super::legend::{caption, legend};
-use super::pictures::Subject;
+use super::pictures::{Scales, Subject};
 use super::places::WorstPlace;
 use super::summary::{Level, Summary};
 use super::tables::path;
 use super::text::{plural, three_digits};
 
-/// The pictures of one camera, as `data:` URIs in the order of [`Subject::ALL`].
+/// The pictures of one camera.
 pub struct Gallery {
     /// The camera's name.
     pub camera: String,
-    /// One per subject.
-    pub pictures: Vec<String>,
+    /// What each shows, and its `data:` URI.
+    pub pictures: Vec<(Subject, String)>,
 }
 
 /// A place with its picture.
@@ -46,14 +46,16 @@ pub struct Page<'a> {
     pub close_ups: &'a [CloseUp],
     /// What helps in this scene.
     pub remedies: &'a Remedies,
-    /// Where the ramp of the error ends, metres.
-    pub error_end_m: f64,
+    /// Where the pictures' ramps end.
+    pub scales: Scales,
     /// Area of the surface that reflects, square metres.
     pub visible_m2: f64,
     /// Albedo and flux per object.
     pub objects: Markup,
     /// Tags.
     pub tags: Markup,
+    /// The static grid in numbers.
+    pub grid: Markup,
     /// Sizes of the file's parts.
     pub sizes: Markup,
     /// Seconds by stage.
@@ -82,6 +84,7 @@ impl Page<'_> {
                         (section("places", "Worst places", PLACES, &self.places()))
                         (section("objects", "Albedo and flux by object", OBJECTS, &self.objects))
                         (section("tags", "Tags", TAGS, &self.tags))
+                        (section("grid", "Static grid", GRID, &self.grid))
                         (section("size", "Size", "", &self.sizes))
                         (section("time", "Time", "", &self.times))
                         @if !self.notes.is_empty() { (section("notes", "Notes", "", &self.notes())) }
@@ -112,7 +115,7 @@ impl Page<'_> {
                 }
                 nav {
                     @for (id, name) in [("reached", "Figures"), ("pictures", "Pictures"), ("places", "Worst places"),
-                        ("objects", "Objects"), ("tags", "Tags"), ("size", "Size"), ("time", "Time")]
+                        ("objects", "Objects"), ("tags", "Tags"), ("grid", "Grid"), ("size", "Size"), ("time", "Time")]
                     { a href={ "#" (id) } { (name) } }
                 }
             }
@@ -122,12 +125,12 @@ impl Page<'_> {
     fn pictures(&self) -> Markup {
         html! { @for (i, gallery) in self.galleries.iter().enumerate() {
             h3 { "Camera " (gallery.camera) }
-            div.gallery { @for (subject, picture) in Subject::ALL.into_iter().zip(&gallery.pictures) {
-                @let (title, explanation) = caption(subject);
-                @let id = format!("{}-{i}", caption(subject).0.to_lowercase().replace(' ', "-"));
+            div.gallery { @for (subject, picture) in &gallery.pictures {
+                @let (title, explanation) = caption(*subject);
+                @let id = format!("{}-{i}", caption(*subject).0.to_lowercase().replace(' ', "-"));
                 figure id=(id) {
                     a href={ "#" (id) } title="enlarge" { img src=(picture) width=(self.size[0]) height=(self.size[1]) alt={ (title) ", camera " (gallery.camera) }; }
-                    div.legend { (legend(subject, self.remedies.required_m, self.error_end_m)) }
+                    div.legend { (legend(*subject, self.remedies.required_m, &self.scales)) }
                     figcaption { b { (title) ". " } (explanation) }
                 }
             } }
@@ -171,6 +174,9 @@ const OBJECTS: &str = "An object's lights should have the mean albedo of its sur
 
 const TAGS: &str = "Surface does not receive light from lights of its own tag; a tag covers that surface. Light lost is the share of its \
     lights' light that would have fallen there rightly, on parts for which the light does not stand, were nothing between.";
+
+const GRID: &str = "Each point blends the probes of its cell, and evaluates the lights that are near for any of them. The bytes of each array \
+    stand under Size.";
 
 fn section(id: &str, title: &str, explanation: &str, content: &Markup) -> Markup {
     html! { section id=(id) {

@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 use image::{Rgb, RgbImage};
 use rayon::prelude::*;
+use vlm_format::VlmAsset;
 
 use super::colour::{
     self, BACKGROUND, HATCH, KEPT_DARK, MAKES_NONE, PLAIN, POKING, VIOLATION, encode, of_tag, pale, ramp,
@@ -10,6 +11,7 @@ use super::colour::{
 };
 use super::correspondence::Place;
 use super::facts::{Evidence, Fact, View};
+use super::grid_view::{self, GridScales, near_lights_at};
 use crate::bvh::Bvh;
 use crate::camera::CameraRays;
 use crate::scene::Camera;
@@ -39,11 +41,15 @@ pub enum Subject {
     TexelAlbedo,
     /// Albedo of the light that stands there.
     LightAlbedo,
+    /// Probes of the grid as dots in the colour of their reach.
+    Probes,
+    /// How many near lights a pixel evaluates.
+    NearLights,
 }
 
 impl Subject {
-    /// All, in the order of the page.
-    pub const ALL: [Self; 8] = [
+    /// All, in the order of the page; those of the grid stand last.
+    const ALL: [Self; 10] = [
         Self::Scene,
         Self::Lights,
         Self::Violations,
@@ -52,27 +58,55 @@ impl Subject {
         Self::Error,
         Self::TexelAlbedo,
         Self::LightAlbedo,
+        Self::Probes,
+        Self::NearLights,
     ];
+
+    /// Those of which an asset has something to show, in the order of the page.
+    pub fn of(asset: &VlmAsset) -> &'static [Self] {
+        if asset.grid.is_some() { &Self::ALL } else { &Self::ALL[..8] }
+    }
 }
 
-/// Draws one subject. `error_end_m` is the distance at which the ramp of the error ends, metres.
+/// Where the pictures' ramps end.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Scales {
+    /// Of the decimation error, metres.
+    pub error_end_m: f64,
+    /// Of the grid; zeros without one.
+    pub grid: GridScales,
+}
+
+impl Scales {
+    /// As long as they must be for nearly all that there is.
+    pub fn new(evidence: &Evidence) -> Self {
+        let grid = evidence.asset.grid.as_ref().map(GridScales::new);
+        Self { error_end_m: error_end(evidence), grid: grid.unwrap_or_default() }
+    }
+}
+
+/// Draws one subject.
 pub fn draw(
     evidence: &Evidence,
     view: &View,
     camera: &Camera,
     subject: Subject,
-    error_end_m: f64,
+    scales: &Scales,
 ) -> RgbImage {
     if subject == Subject::Lights {
         return facets(evidence, camera, view.width, view.height);
     }
-    RgbImage::from_fn(view.width, view.height, |x, y| {
+    let mut picture = RgbImage::from_fn(view.width, view.height, |x, y| {
         let fact = view.facts[(y * view.width + x) as usize].as_ref();
-        Rgb(fact.map_or(BACKGROUND, |fact| pixel(evidence, fact, subject, [x, y], error_end_m)))
-    })
+        Rgb(fact.map_or(BACKGROUND, |fact| pixel(evidence, fact, subject, [x, y], scales)))
+    });
+    if subject == Subject::Probes {
+        grid_view::dots(evidence, view, camera, &scales.grid, &mut picture);
+    }
+    picture
 }
 
-fn pixel(evidence: &Evidence, fact: &Fact, subject: Subject, at: [u32; 2], error_end_m: f64) -> [u8; 3] {
+fn pixel(evidence: &Evidence, fact: &Fact, subject: Subject, at: [u32; 2], scales: &Scales) -> [u8; 3] {
     let required_m = evidence.verification.required_m;
     let lit = |colour: [u8; 3]| shade(colour, fact.facing);
     let measured = |value: &dyn Fn() -> [u8; 3]| match fact.place {
@@ -89,12 +123,18 @@ fn pixel(evidence: &Evidence, fact: &Fact, subject: Subject, at: [u32; 2], error
             Place::MakesNone => MAKES_NONE,
         },
         Subject::Clearance => measured(&|| of_clearance(fact, required_m)),
-        Subject::Error => measured(&|| ramp((fact.light.distance_m - required_m) / error_end_m)),
+        Subject::Error => measured(&|| ramp((fact.light.distance_m - required_m) / scales.error_end_m)),
         Subject::Tags => measured(&|| of_tags(fact, at)),
         Subject::Violations => match fact.place {
             Place::MakesNone => lit(MAKES_NONE),
             _ => lit(of_violation(evidence, fact).unwrap_or(PLAIN)),
         },
+        // Dark, since dots may be bright.
+        Subject::Probes => greyed(fact).map(|channel| channel / 2),
+        Subject::NearLights => {
+            let near = evidence.asset.grid.as_ref().and_then(|grid| near_lights_at(grid, fact));
+            lit(near.map_or(MAKES_NONE, |near| ramp(near as f64 / scales.grid.near)))
+        }
         Subject::Lights => BACKGROUND,
     }
 }
@@ -133,6 +173,11 @@ fn of_violation(evidence: &Evidence, fact: &Fact) -> Option<[u8; 3]> {
     evidence.pokes_out[light as usize].map(|tagged| if tagged { KEPT_DARK } else { POKING })
 }
 
+/// The scene without much colour, so that others stand out on it.
+fn greyed(fact: &Fact) -> [u8; 3] {
+    shade_linear(fact.point.albedo.lerp(Vec3::splat(0.5), 0.6), fact.facing)
+}
+
 /// Diagonal stripes.
 fn hatched([x, y]: [u32; 2], colour: [u8; 3]) -> [u8; 3] {
     if (x + y) % 7 < 2 { HATCH } else { colour }
@@ -155,7 +200,7 @@ pub fn draw_close(evidence: &Evidence, view: &View, camera: &Camera, light: Opti
             return Rgb(POKING);
         }
         Rgb(fact.map_or(BACKGROUND, |fact| {
-            let scene = shade_linear(fact.point.albedo.lerp(Vec3::splat(0.5), 0.6), fact.facing);
+            let scene = greyed(fact);
             match fact.place {
                 Place::Uncovered => hatched([x, y], scene),
                 _ => of_violation(evidence, fact).map_or(scene, |colour| shade(colour, fact.facing)),
@@ -195,7 +240,7 @@ fn facets(evidence: &Evidence, camera: &Camera, width: u32, height: u32) -> RgbI
 }
 
 /// Where the ramp of the error ends: what all but a hundredth of the surface stays below, metres; `None` if nothing is covered.
-pub fn error_end(evidence: &Evidence) -> f64 {
+fn error_end(evidence: &Evidence) -> f64 {
     let verification = evidence.verification;
     let pairs = verification.points.iter().zip(&verification.light_of_point);
     // Every eighth point settles a percentile well enough.

@@ -11,6 +11,7 @@ use super::facts::Evidence;
 use super::objects::{ObjectFigures, percent};
 use super::text::{area, bytes, count, length};
 use crate::flux::TOLERANCE;
+use crate::grid_content::GridContent;
 use crate::report::Report;
 use crate::tag::{TagReason, TagReport};
 
@@ -243,6 +244,45 @@ fn reason(reason: TagReason) -> &'static str {
 pub fn path(path: &str) -> Markup {
     let shown = if path.is_empty() { "scene" } else { path };
     html! { @for (i, part) in shown.split('/').enumerate() { @if i > 0 { "/" wbr; } (part) } }
+}
+
+/// The static grid in numbers.
+pub fn grid_table(grid: Option<&Grid>) -> Markup {
+    let Some(grid) = grid.map(GridContent::of) else {
+        return html! { p { "None: every pixel sums all lights, and nothing hides them." } };
+    };
+    html! {
+        div.scroll { table.narrow { tbody { @for (what, figure) in grid_rows(&grid) {
+            tr { th scope="row" { (what) } td.n { (figure) } }
+        } } } }
+    }
+}
+
+fn grid_rows(grid: &GridContent) -> Vec<(String, String)> {
+    let number = |n: usize| count(n as u64);
+    let per_probe = |n: f64| format!("{:.1} a probe", n / grid.probes.max(1) as f64);
+    let [x, y, z] = grid.dimensions;
+    let mut rows = vec![
+        (
+            "cells of the coarsest level".to_owned(),
+            format!("{x} × {y} × {z} of {}", length(grid.cell_size_m.into())),
+        ),
+        ("of these, with something in them".to_owned(), number(grid.stored_cells)),
+        ("leaves".to_owned(), number(grid.leaves)),
+    ];
+    let levels = grid.leaves_by_level.iter().enumerate();
+    rows.extend(levels.map(|(level, &leaves)| (format!("leaves of level {level}"), number(leaves))));
+    let near = format!("{}, {}", number(grid.near_entries), per_probe(grid.near_entries as f64));
+    let rows_text = format!("{}, {:.1} sources a probe", count(grid.far_entries.into()), grid.mean_row);
+    rows.extend([
+        ("probes on surface".to_owned(), count(grid.surface_probes.into())),
+        ("probes in free space".to_owned(), number(grid.free_probes)),
+        ("probes listed by leaves".to_owned(), number(grid.listed_probes)),
+        ("near lights".to_owned(), near),
+        ("entries of rows".to_owned(), rows_text),
+        ("all arrays".to_owned(), bytes(grid.bytes as u64)),
+    ]);
+    rows
 }
 
 /// What the asset adds to the file, by part.

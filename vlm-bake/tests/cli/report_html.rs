@@ -12,7 +12,7 @@ use vlm_bake::progress::Silent;
 use vlm_bake::report_html::{Subjects, report_html};
 use vlm_bake::scene::{LoadOptions, Scene, load};
 use vlm_bake::verify::verify_asset;
-use vlm_format::GltfFile;
+use vlm_format::{GltfFile, Grid};
 
 use crate::support::{Document, Folders, repository, run, text, vlm};
 
@@ -98,11 +98,46 @@ fn the_page_is_whole_and_fetches_nothing() {
     {
         assert!(reaches_out(&(page.clone() + hostile)), "the check sees {hostile}");
     }
-    for alt in
-        ["Scene", "Virtual lights", "Violations", "Clearance", "Tags", "Decimation error", "Albedo of the"]
-    {
+    for alt in [
+        "Scene",
+        "Virtual lights",
+        "Violations",
+        "Clearance",
+        "Tags",
+        "Decimation error",
+        "Albedo of the",
+        "Probes",
+        "Near lights",
+    ] {
         assert_eq!(picture(&page, alt).dimensions(), (480, 360), "{alt}");
     }
+}
+
+#[test]
+fn the_grid_is_shown_and_told() {
+    let (scene, mut bake) = baked(&repository("assets/cornell.glb"), 200);
+    let whole = page(&scene, &bake);
+    let grid = bake.asset.grid.as_mut().unwrap();
+    let told = section(&whole, "grid");
+    let probes = grid.probes.len() as u64;
+    assert!(told.contains(&format!(">{},{:03}<", probes / 1000, probes % 1000)), "{probes} probes: {told}");
+    assert!(told.contains("leaves of level 1") && told.contains("sources a probe"), "{told}");
+    // Fewer probes show as fewer dots, and other lists as other colours.
+    let (dots, colours) = (picture(&whole, "Probes"), picture(&whole, "Near lights"));
+    grid.surface_probes /= 2;
+    grid.near_starts.iter_mut().for_each(|start| *start = 0);
+    let less = page(&scene, &bake);
+    assert!(picture(&less, "Near lights") != colours, "no near light is left");
+    let scene_alone = {
+        bake.asset.grid.as_mut().unwrap().surface_probes = 0;
+        picture(&page(&scene, &bake), "Probes")
+    };
+    let differing = |a: &RgbImage| a.pixels().zip(scene_alone.pixels()).filter(|(a, b)| a != b).count();
+    let (all, half) = (differing(&dots), differing(&picture(&less, "Probes")));
+    assert!(half > 100 && half < all, "{half} of {all} pixels");
+    bake.asset.grid = None;
+    let without = page(&scene, &bake);
+    assert!(!without.contains("Near lights") && section(&without, "grid").contains("None"));
 }
 
 #[test]
@@ -229,7 +264,8 @@ fn sizes_are_listed_by_array_of_the_grid() {
         let page = page_of(&Document::room(), &[&["--lights", "60"], flags].concat());
         section(&page, "size").matches("grid: ").count()
     };
-    assert_eq!((rows(&[]), rows(&["--probes", "0"])), (10, 0));
+    let arrays = Grid::default().sizes().len();
+    assert_eq!((rows(&[]), rows(&["--probes", "0"])), (arrays, 0));
 }
 
 #[test]

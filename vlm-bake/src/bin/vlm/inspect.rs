@@ -6,11 +6,12 @@ use std::path::PathBuf;
 use clap::Args;
 use glam::Vec3;
 use serde::Serialize;
+use vlm_bake::grid_content::GridContent;
 use vlm_format::{Settings, VlmAsset, read_vlm_unchecked};
 
 use crate::error::CliError;
 use crate::input::open;
-use crate::inspect_grid::GridContent;
+use crate::inspect_grid::lines as grid_lines;
 use crate::output::{print, print_json};
 
 /// Flags of `vlm inspect`.
@@ -119,8 +120,7 @@ impl Content {
             ),
         ];
         lines.extend(self.vlms.iter().map(VlmContent::line));
-        lines
-            .extend(self.grid.as_ref().map_or_else(|| vec!["grid      none".to_owned()], GridContent::lines));
+        lines.extend(self.grid.as_ref().map_or_else(|| vec!["grid      none".to_owned()], grid_lines));
         lines
     }
 }

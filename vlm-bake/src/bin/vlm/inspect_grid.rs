@@ -1,160 +1,45 @@
 //! What `vlm inspect` says about the static grid.
 
-use serde::Serialize;
-use vlm_format::{Grid, Leaf};
+use vlm_bake::grid_content::{Bin, GridContent};
 
 /// Length of the longest bar of a histogram, characters.
 const BAR: usize = 40;
 
-/// A grid in numbers.
-#[derive(Serialize)]
-pub struct GridContent {
-    cell_size_m: f32,
-    /// Of the coarsest level.
-    dimensions: [u32; 3],
-    /// Cells of the coarsest level that hold something.
-    stored_cells: usize,
-    leaves: usize,
-    /// Leaves of each level, the coarsest first.
-    leaves_by_level: Vec<usize>,
-    probes: usize,
-    surface_probes: u32,
-    free_probes: usize,
-    /// Entries over the leaves' lists of probes.
-    listed_probes: usize,
-    near_entries: usize,
-    far_entries: u32,
-    /// Sources in a probe's row, on average.
-    mean_row: f64,
-    bytes: usize,
-    bytes_by_array: Vec<ArrayBytes>,
-    /// Leaves by how many probes on surface they list.
-    probes_of_leaves: Vec<Bin>,
-    /// Leaves by how many lights are near for any of their probes on surface: the most that a pixel evaluates.
-    near_lights_of_leaves: Vec<Bin>,
-}
-
-#[derive(Serialize)]
-struct ArrayBytes {
-    array: &'static str,
-    bytes: usize,
-}
-
-/// How many things have `from` to `to` of something, both included.
-#[derive(Debug, PartialEq, Serialize)]
-struct Bin {
-    from: usize,
-    to: usize,
-    count: usize,
-}
-
-impl GridContent {
-    /// Of a valid grid.
-    pub fn of(grid: &Grid) -> Self {
-        let lists: Vec<&[u32]> = grid.leaves.windows(2).map(|leaf| list(grid, leaf)).collect();
-        let near = |list: &&[u32]| {
-            let near = list.iter().flat_map(|&probe| grid.near_of(probe as usize));
-            let mut lights: Vec<u32> = near.copied().collect();
-            lights.sort_unstable();
-            lights.dedup();
-            lights.len()
-        };
-        let roots = grid.dimensions.iter().map(|&cells| cells as usize).product();
-        let sources: usize = (0..grid.probes.len()).map(|probe| grid.row(probe).count()).sum();
-        let bytes_by_array = grid.sizes().map(|(array, bytes)| ArrayBytes { array, bytes });
-        Self {
-            cell_size_m: grid.cell_size,
-            dimensions: grid.dimensions,
-            stored_cells: grid.cells.iter().take(roots).filter(|&&cell| cell != 0).count(),
-            leaves: lists.len(),
-            leaves_by_level: leaves_by_level(grid, roots),
-            probes: grid.probes.len(),
-            surface_probes: grid.surface_probes,
-            free_probes: grid.probes.len().saturating_sub(grid.surface_probes as usize),
-            listed_probes: grid.leaf_probes.len(),
-            near_entries: grid.near.len(),
-            far_entries: grid.row_starts.get(grid.probes.len()).copied().unwrap_or(0),
-            mean_row: sources as f64 / grid.probes.len().max(1) as f64,
-            bytes: grid.byte_len(),
-            bytes_by_array: bytes_by_array.into(),
-            probes_of_leaves: histogram(lists.iter().map(|list| list.len())),
-            near_lights_of_leaves: histogram(lists.iter().map(near)),
-        }
-    }
-
-    /// The grid's part of the report.
-    pub fn lines(&self) -> Vec<String> {
-        let [x, y, z] = self.dimensions;
-        let levels: Vec<String> = self.leaves_by_level.iter().map(usize::to_string).collect();
-        let mut lines = vec![
-            format!(
-                "grid      {x} x {y} x {z} cells of {} m, {} stored; {:.1} kB",
-                self.cell_size_m,
-                self.stored_cells,
-                kilobytes(self.bytes)
-            ),
-            format!("leaves    {}; by level, coarsest first: {}", self.leaves, levels.join(", ")),
-            format!(
-                "probes    {} on surface, {} in free space; {} times listed by leaves",
-                self.surface_probes, self.free_probes, self.listed_probes
-            ),
-            format!(
-                "light     {} near lights; rows of {:.1} sources on average, {} entries",
-                self.near_entries, self.mean_row, self.far_entries
-            ),
-        ];
-        lines.extend(
-            self.bytes_by_array
-                .iter()
-                .map(|a| format!("bytes     {:<12} {:>9.1} kB", a.array, kilobytes(a.bytes))),
-        );
-        lines.push("leaves by their probes on surface".to_owned());
-        lines.extend(bars(&self.probes_of_leaves));
-        lines.push("leaves by lights that are near for any of their probes".to_owned());
-        lines.extend(bars(&self.near_lights_of_leaves));
-        lines
-    }
+/// The grid's part of the report.
+pub fn lines(grid: &GridContent) -> Vec<String> {
+    let [x, y, z] = grid.dimensions;
+    let levels: Vec<String> = grid.leaves_by_level.iter().map(usize::to_string).collect();
+    let mut lines = vec![
+        format!(
+            "grid      {x} x {y} x {z} cells of {} m, {} stored; {:.1} kB",
+            grid.cell_size_m,
+            grid.stored_cells,
+            kilobytes(grid.bytes)
+        ),
+        format!("leaves    {}; by level, coarsest first: {}", grid.leaves, levels.join(", ")),
+        format!(
+            "probes    {} on surface, {} in free space; {} times listed by leaves",
+            grid.surface_probes, grid.free_probes, grid.listed_probes
+        ),
+        format!(
+            "light     {} near lights; rows of {:.1} sources on average, {} entries",
+            grid.near_entries, grid.mean_row, grid.far_entries
+        ),
+    ];
+    lines.extend(
+        grid.bytes_by_array
+            .iter()
+            .map(|a| format!("bytes     {:<12} {:>9.1} kB", a.array, kilobytes(a.bytes))),
+    );
+    lines.push("leaves by their probes on surface".to_owned());
+    lines.extend(bars(&grid.probes_of_leaves));
+    lines.push("leaves by lights that are near for any of their probes".to_owned());
+    lines.extend(bars(&grid.near_lights_of_leaves));
+    lines
 }
 
 fn kilobytes(bytes: usize) -> f64 {
     bytes as f64 / 1e3
-}
-
-/// The probes on surface of a leaf, which stands before the next one.
-fn list<'a>(grid: &'a Grid, leaf: &[Leaf]) -> &'a [u32] {
-    let range = leaf.first().map(|leaf| leaf.probes as usize..leaf.free_probes as usize);
-    range.and_then(|range| grid.leaf_probes.get(range)).unwrap_or(&[])
-}
-
-/// Groups of eight stand after the cells that they divide, so one pass sees each cell's level before its parts.
-fn leaves_by_level(grid: &Grid, roots: usize) -> Vec<usize> {
-    let mut level: Vec<Option<usize>> = vec![None; grid.cells.len()];
-    level.iter_mut().take(roots).for_each(|level| *level = Some(0));
-    let mut leaves = Vec::new();
-    for (at, &cell) in grid.cells.iter().enumerate() {
-        let Some(here) = level[at] else { continue };
-        if cell % 2 == 1 {
-            leaves.resize(leaves.len().max(here + 1), 0);
-            leaves[here] += 1;
-        } else if cell != 0 {
-            level.iter_mut().skip(cell as usize / 2).take(8).for_each(|level| *level = Some(here + 1));
-        }
-    }
-    leaves
-}
-
-/// Counts in bins of 0, 1, 2 to 3, 4 to 7 and so on, up to the last that holds something.
-fn histogram(values: impl Iterator<Item = usize>) -> Vec<Bin> {
-    let mut bins: Vec<Bin> = Vec::new();
-    for value in values {
-        let bin = value.checked_ilog2().map_or(0, |power| power as usize + 1);
-        while bins.len() <= bin {
-            let from = if bins.is_empty() { 0 } else { 1 << (bins.len() - 1) };
-            bins.push(Bin { from, to: (2 * from).saturating_sub(1), count: 0 });
-        }
-        bins[bin].count += 1;
-    }
-    bins
 }
 
 fn bars(bins: &[Bin]) -> Vec<String> {
@@ -171,45 +56,13 @@ fn bars(bins: &[Bin]) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-
     use super::*;
 
     #[test]
-    fn bins_double_and_count_everything() {
-        let counts = |values: &[usize]| -> Vec<[usize; 3]> {
-            histogram(values.iter().copied()).iter().map(|bin| [bin.from, bin.to, bin.count]).collect()
-        };
-        assert_eq!(counts(&[]), [[0; 3]; 0]);
-        assert_eq!(counts(&[0, 0]), [[0, 0, 2]]);
-        assert_eq!(counts(&[1, 3, 2, 4, 8]), [[0, 0, 0], [1, 1, 1], [2, 3, 2], [4, 7, 1], [8, 15, 1]]);
-    }
-
-    #[test]
     fn bars_are_as_long_as_counts_are_large() {
-        let bins = histogram([1, 1, 1, 1, 2].into_iter());
+        let bin = |from, count| Bin { from, to: from, count };
+        let bins = [bin(0, 0), bin(1, 4), bin(2, 1)];
         let lengths: Vec<usize> = bars(&bins).iter().map(|line| line.matches('#').count()).collect();
         assert_eq!(lengths, [0, BAR, BAR / 4]);
-    }
-
-    #[test]
-    fn leaves_are_counted_on_their_level_and_unreachable_ones_are_not() {
-        // Two cells: a leaf, and one of eight parts, of which one is divided; then a group to which nothing leads.
-        let mut cells = vec![1_u32; 2 + 3 * 8];
-        (cells[1], cells[2], cells[3]) = (2 * 2, 0, 2 * 10);
-        let grid = Grid { dimensions: [2, 1, 1], cells, ..Grid::default() };
-        assert_eq!(leaves_by_level(&grid, 2), [1, 6, 8]);
-    }
-
-    #[test]
-    fn a_light_that_is_near_for_two_probes_of_a_leaf_counts_once() {
-        let grid = Grid {
-            leaves: vec![Leaf { probes: 0, free_probes: 2 }, Leaf { probes: 2, free_probes: 2 }],
-            leaf_probes: vec![0, 1],
-            near_starts: vec![0, 2, 3],
-            near: vec![3, 4, 3],
-            ..Grid::default()
-        };
-        let last = GridContent::of(&grid).near_lights_of_leaves.pop();
-        assert_eq!(last, Some(Bin { from: 2, to: 3, count: 1 }));
     }
 }

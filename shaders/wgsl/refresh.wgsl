@@ -1,0 +1,140 @@
+// What arrives at the probes, from the radiosity of the sources; one invocation per probe. After shared/grid.wgsl,
+// shared/blend.wgsl and shared/far.wgsl; mirror: src/cpu/refresh.rs.
+//
+// Runs again only where lights changed. Every probe writes its own far light and its own near lights, so invocations share nothing.
+
+const LEAST_COSINE: f32 = 0.2;
+
+struct FarSource {
+    centroid: vec3f,
+    padding: f32,
+    normal: vec3f,
+    padding_2: f32,
+}
+
+struct Row {
+    next: u32,
+    end: u32,
+    source: u32,
+}
+
+@group(1) @binding(1) var<storage, read> rows: array<u32>;
+@group(1) @binding(2) var<storage, read> near_form_factors: array<f32>;
+@group(1) @binding(3) var<storage, read> sources: array<FarSource>;
+// Of the sources, lx; w is not used.
+@group(1) @binding(4) var<storage, read> radiosity: array<vec4f>;
+// One per probe on surface.
+@group(1) @binding(5) var<storage, read_write> far: array<FarLight>;
+// One per element of `near`, lx; w is not used.
+@group(1) @binding(6) var<storage, read_write> near_radiosities: array<vec4f>;
+
+@compute @workgroup_size(64)
+fn refresh(@builtin(global_invocation_id) id: vec3u) {
+    let probe = id.x;
+    if probe >= header.probe_count {
+        return;
+    }
+    if probe < header.surface_probes {
+        far[probe] = far_light(probe);
+    }
+    let row_scale = probes[probe].row_scale;
+    let range = near_range(probe);
+    for (var near = range.start; near < range.end; near++) {
+        near_radiosities[near] = vec4f(near_radiosity(near, row_scale), 0.0);
+    }
+}
+
+fn near_radiosity(number: u32, row_scale: f32) -> vec3f {
+    let light = indices[header.near + number];
+    let form_factor = near_form_factors[number];
+    var row = row_of(header.probe_count + number);
+    row.source = sample_range(light).start;
+    var irradiance = vec3f(0.0);
+    for (var weight = next_weight(&row); weight > 0u; weight = next_weight(&row)) {
+        if row.source < arrayLength(&radiosity) {
+            irradiance += radiosity[row.source].rgb * f32(weight);
+        }
+    }
+    return irradiance * (row_scale / form_factor);
+}
+
+fn far_light(number: u32) -> FarLight {
+    let probe = probes[number];
+    let bitangent = cross(probe.normal, probe.tangent);
+    var by_normal = mat3x3f();
+    var along = mat2x3f();
+    var row = row_of(number);
+    for (var weight = next_weight(&row); weight > 0u; weight = next_weight(&row)) {
+        let light = row.source;
+        if light >= min(arrayLength(&sources), arrayLength(&radiosity)) {
+            continue;
+        }
+        let source = sources[light];
+        let irradiance = radiosity[light].rgb * (f32(weight) * probe.row_scale);
+        // `lean . n = 1` at the probe's own normal, so there the irradiance is the row's.
+        let lean = lean(probe, source);
+        by_normal += mat3x3f(irradiance * lean.x, irradiance * lean.y, irradiance * lean.z);
+        let slope = slope(probe, source);
+        along += mat2x3f(irradiance * dot(slope, probe.tangent), irradiance * dot(slope, bitangent));
+    }
+    return FarLight(
+        array(packed(by_normal[0]), packed(by_normal[1]), packed(by_normal[2])),
+        array(packed(along[0]), packed(along[1])),
+        0.0,
+    );
+}
+
+fn lean(probe: Probe, source: FarSource) -> vec3f {
+    let direction = normalize_or_zero(source.centroid - probe.position);
+    let cosine = dot(direction, probe.normal);
+    return probe.normal + (direction - probe.normal * cosine) / max(cosine, LEAST_COSINE);
+}
+
+fn slope(probe: Probe, source: FarSource) -> vec3f {
+    let r = source.centroid - probe.position;
+    let squared = dot(r, r);
+    let facing = min(dot(source.normal, r), -LEAST_COSINE * sqrt(squared));
+    let slope = r * (4.0 / squared) - source.normal / facing;
+    let most = 4.0 / dot(probe.reach, vec4f(1.0));
+    if !(squared > 0.0 && is_finite(slope)) {
+        return vec3f(0.0);
+    }
+    let size = length(slope);
+    if size > most {
+        return slope * (most / size);
+    }
+    return slope;
+}
+
+fn normalize_or_zero(v: vec3f) -> vec3f {
+    let size = length(v);
+    if size > 0.0 {
+        return v / size;
+    }
+    return vec3f(0.0);
+}
+
+fn packed(v: vec3f) -> array<f32, 3> {
+    return array(v.x, v.y, v.z);
+}
+
+fn row_of(number: u32) -> Row {
+    let at = header.row_starts + number;
+    return Row(indices[at], indices[at + 1u], 0u);
+}
+
+// The weight of a row's next entry and, in `source`, whose it is; 0 after the last.
+fn next_weight(row: ptr<function, Row>) -> u32 {
+    while (*row).next < (*row).end && (*row).next / 2u < arrayLength(&rows) {
+        let word = rows[(*row).next / 2u];
+        let entry = (word >> (16u * ((*row).next & 1u))) & 0xffffu;
+        (*row).next++;
+        let step = entry & 0xffu;
+        let weight = entry >> 8u;
+        (*row).source += select(step, 256u * step, weight == 0u);
+        if weight > 0u {
+            return weight;
+        }
+    }
+    return 0u;
+}

@@ -1,0 +1,98 @@
+// The weights of a leaf's probes for a point. After shared/grid.wgsl; mirrors: `Probe` in vlm-format/src/grid.rs, src/cpu/grid.rs.
+
+const LEAST_NORMAL_COSINE: f32 = 0.5;
+const FIRM: f32 = 0.05;
+
+struct Probe {
+    position: vec3f,
+    row_scale: f32,
+    normal: vec3f,
+    reach_up: f32,
+    tangent: vec3f,
+    reach_down: f32,
+    reach: vec4f,
+}
+
+struct Blend {
+    first: u32,
+    count: u32,
+    weights: array<f32, MOST_PROBES>,
+}
+
+@group(1) @binding(0) var<storage, read> probes: array<Probe>;
+
+fn local(probe: Probe, position: vec3f) -> vec3f {
+    let away = position - probe.position;
+    let bitangent = cross(probe.normal, probe.tangent);
+    return vec3f(dot(away, probe.tangent), dot(away, bitangent), dot(away, probe.normal));
+}
+
+fn place_weight(probe: Probe, local: vec3f) -> f32 {
+    let against = vec3f(probe.reach.xz, probe.reach_down);
+    let along = vec3f(probe.reach.yw, probe.reach_up);
+    let c = local / select(along, against, local < vec3f(0.0));
+    let w = max(1.0 - c * c, vec3f(0.0));
+    let product = w.x * w.y * w.z;
+    return product * product;
+}
+
+fn stray_weight(probe: Probe, local: vec3f, normal: vec3f) -> f32 {
+    let facing = max(0.5 + 0.5 * dot(normal, probe.normal), 0.0);
+    let size = max(max(probe.reach.x, probe.reach.y), max(probe.reach.z, probe.reach.w));
+    let away = dot(local, local) / (size * size);
+    return (facing * facing + 1e-3) / (1e-2 + away * away);
+}
+
+fn normal_weight(probe: Probe, normal: vec3f) -> f32 {
+    let c = clamp((dot(normal, probe.normal) - LEAST_NORMAL_COSINE) / (1.0 - LEAST_NORMAL_COSINE), 0.0, 1.0);
+    return c * c;
+}
+
+fn blend(leaf: u32, position: vec3f, normal: vec3f) -> Blend {
+    var blend = Blend();
+    if !is_leaf(leaf) {
+        return blend;
+    }
+    let lists = leaf_of(leaf);
+    blend.first = lists.probes;
+    blend.count = min(lists.free_probes - lists.probes, MOST_PROBES);
+    var strays = array<f32, MOST_PROBES>();
+    var sum = 0.0;
+    var stray_sum = 0.0;
+    for (var i = 0u; i < blend.count; i++) {
+        let number = probe_of(blend.first, i);
+        if number >= arrayLength(&probes) {
+            continue;
+        }
+        let probe = probes[number];
+        let place = local(probe, position);
+        let weight = normal_weight(probe, normal) * place_weight(probe, place);
+        let stray = stray_weight(probe, place, normal);
+        blend.weights[i] = weight;
+        strays[i] = stray;
+        sum += weight;
+        stray_sum += stray;
+    }
+    // Where reaches end, strays fade in.
+    var stray_share = max(1.0 - sum / FIRM, 0.0);
+    stray_share *= stray_share;
+    var inside = 0.0;
+    var outside = 0.0;
+    if sum > 0.0 {
+        inside = (1.0 - stray_share) / sum;
+    } else {
+        stray_share = 1.0;
+    }
+    if stray_sum > 0.0 {
+        outside = stray_share / stray_sum;
+    }
+    for (var i = 0u; i < blend.count; i++) {
+        blend.weights[i] = blend.weights[i] * inside + strays[i] * outside;
+    }
+    return blend;
+}
+
+// The number of probe `i` of those of a leaf, which begin at `first`.
+fn probe_of(first: u32, i: u32) -> u32 {
+    return indices[header.leaf_probes + first + i];
+}
