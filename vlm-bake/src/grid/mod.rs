@@ -30,7 +30,7 @@ use vlm_shaders::cpu::upload::LightSet;
 use self::near::NearLight;
 use self::pool::Place;
 use self::transport::Row;
-use crate::progress::{Progress, Silent};
+use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::shade::TraceScene;
 
@@ -92,24 +92,25 @@ pub fn grid(input: &GridInput, options: &GridOptions, progress: &dyn Progress) -
         rays: (options.rays as f32 * ROUGH_RAYS) as u32,
         ..*options
     };
-    progress.begin("rough grid", 1);
-    let rough = built(input, &pool, bounds, &rough, &Silent);
+    let rough = built(input, &pool, bounds, &rough, progress)?;
     refine::refine(input, &mut pool, &rough);
-    Some(built(input, &pool, bounds, options, progress))
+    built(input, &pool, bounds, options, progress)
 }
 
-/// Share of the probes and rays for the grid that tells where probes should lie closer.
+/// Share of the probes for the grid that tells where probes should lie closer. More of them find smaller places.
 const ROUGH_PROBES: f32 = 0.5;
+
+/// Likewise of the rays. Fewer of them take noise for error.
 const ROUGH_RAYS: f32 = 0.25;
 
-/// The grid whose probes' spacing follows the openness of the pool.
+/// The grid whose probes' spacing follows the openness of the pool; `None` if it was cancelled.
 fn built(
     input: &GridInput,
     pool: &[Place],
     bounds: [DVec3; 2],
     options: &GridOptions,
     progress: &dyn Progress,
-) -> Grid {
+) -> Option<Grid> {
     let spacing = spacing::Spacing::new(pool, bounds, options.probes);
     let mut chosen = spacing.spread(pool, 0..pool.len() as u32, 1.0);
     let mut probes = reach::probes(input.trace, pool, &spacing, &chosen);
@@ -135,7 +136,7 @@ fn built(
     grid.sample_shares = input.shares.to_vec();
     grid.surface_gains = input.gains.to_vec();
     grid.uncovered = input.uncovered.to_vec();
-    grid
+    Some(grid)
 }
 
 /// The cells of the box between two, both included, x fastest.

@@ -27,8 +27,10 @@ const RAYS: u32 = 128;
 /// `1 / (q + 1)` with `q` near 1: borders of shadow are steps, all else is smooth.
 const EXPONENT: f32 = 0.45;
 
-/// Spacing shrinks and grows by at most these factors against what openness alone asks for.
+/// Spacing shrinks to no less than this share of what openness alone asks for.
 const SHRINK: f32 = 0.25;
+
+/// Spacing grows by at most this factor, since what was not found may be there all the same.
 const GROW: f32 = 1.6;
 
 /// Errors below this share of the mean light do not count.
