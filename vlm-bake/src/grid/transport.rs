@@ -1,12 +1,13 @@
 //! What share of a probe's light comes from which surface, by rays over its hemisphere.
 
+use glam::Vec3;
 use rayon::prelude::*;
 use vlm_shaders::cpu::upload::LightSet;
 
 use super::pool::Place;
 use super::{GridInput, StandIns, made_lights};
 use crate::progress::Progress;
-use crate::reference::directions_above;
+use crate::reference::{directions_above, directions_around};
 use crate::shade::{SurfacePoint, TraceScene};
 
 /// Irradiance per radiosity by source, ascending by source: samples, then lights.
@@ -24,8 +25,21 @@ pub fn rows(input: &GridInput, places: &[Place], rays: u32, progress: &dyn Progr
     let row = |(i, place): (usize, &Place)| {
         progress.advance(1);
         let row = transport(input.trace, input.stand_ins, &place.surface, rays, i as u64);
-        let mut row = whole_lights(input, place, &row);
+        let mut row = whole_lights(input, place.surface.position, &row);
         made_lights::add(input, &made, place, &mut row);
+        row
+    };
+    places.par_iter().enumerate().map(row).collect()
+}
+
+/// The rows of places in free space (metres): the share of all directions in which each sees a source.
+#[must_use]
+pub fn free_rows(input: &GridInput, places: &[Vec3], rays: u32) -> Vec<Row> {
+    let made = made_lights::made_lights(input);
+    let row = |(i, &place): (usize, &Vec3)| {
+        let row = shares(input.trace, input.stand_ins, place, directions_around(rays, i as u64), rays);
+        let mut row = whole_lights(input, place, &row);
+        made_lights::add_around(input, &made, place, &mut row);
         row
     };
     places.par_iter().enumerate().map(row).collect()
@@ -41,8 +55,19 @@ pub fn transport(
     seed: u64,
 ) -> Row {
     let origin = trace.bvh.leave(surface.position, surface.geometric_normal);
+    shares(trace, stand_ins, origin, directions_above(surface, rays, seed), rays)
+}
+
+/// The share of `rays` that each sample gets of the light along some directions.
+fn shares(
+    trace: &TraceScene,
+    stand_ins: &StandIns,
+    origin: Vec3,
+    directions: impl Iterator<Item = Vec3>,
+    rays: u32,
+) -> Row {
     let mut met: Vec<u32> = Vec::with_capacity(rays as usize);
-    for direction in directions_above(surface, rays, seed) {
+    for direction in directions {
         let hit = trace.path_hit(origin, direction).filter(|hit| trace.is_lit_side(hit));
         met.extend(hit.and_then(|hit| stand_ins.sample_at(hit.triangle, hit.barycentric, hit.front)));
     }
@@ -51,7 +76,7 @@ pub fn transport(
 }
 
 /// Joins the samples of lights that seem small into the lights themselves.
-fn whole_lights(input: &GridInput, place: &Place, row: &Row) -> Row {
+fn whole_lights(input: &GridInput, place: Vec3, row: &Row) -> Row {
     let samples = input.light_of_sample.len() as u32;
     let mut joined: Row = Vec::with_capacity(row.len());
     let mut whole: Row = Vec::new();
@@ -69,7 +94,7 @@ fn whole_lights(input: &GridInput, place: &Place, row: &Row) -> Row {
     joined
 }
 
-fn seems_small(lights: &LightSet, light: u32, place: &Place) -> bool {
+fn seems_small(lights: &LightSet, light: u32, place: Vec3) -> bool {
     let geometry = &lights.geometry[light as usize];
-    geometry.longest_edge() < WHOLE * geometry.centroid().distance(place.surface.position)
+    geometry.longest_edge() < WHOLE * geometry.centroid().distance(place)
 }
