@@ -39,12 +39,24 @@ impl FreeLight {
         irradiance.truncate().max(Vec3::ZERO)
     }
 
+    /// The band of a coefficient, 0 to 2.
+    #[must_use]
+    pub fn band(coefficient: usize) -> usize {
+        if coefficient < BANDS[1] { 0 } else { 1 + usize::from(coefficient >= BANDS[2]) }
+    }
+
+    /// What is left of each band of a source that fills this share of all directions: it counts as a disk.
+    #[must_use]
+    pub fn blur(share: f32) -> [f32; 3] {
+        [1.0, 1.0 - share, (1.0 - share) * (1.0 - 2.0 * share)]
+    }
+
     /// Adds the light of a source of this `radiosity` (lx) that fills the `share` of all directions around `direction` (a unit vector).
     pub fn add(&mut self, direction: Vec3, share: f32, radiosity: Vec3) {
         let harmonics = harmonics(direction);
-        // Radiance is radiosity / pi, the solid angle 4 pi share. The source counts as a disk, whose bands fade with its size.
+        // Radiance is radiosity / pi, the solid angle 4 pi share.
         let strength = radiosity * (4.0 * share);
-        let blur = [1.0, 1.0 - share, (1.0 - share) * (1.0 - 2.0 * share)];
+        let blur = Self::blur(share);
         for band in 0..COSINE.len() {
             let strength = (strength * (COSINE[band] * blur[band])).extend(0.0);
             for i in BANDS[band]..BANDS[band + 1] {

@@ -12,6 +12,7 @@
 
 mod free;
 mod free_reach;
+mod free_rows;
 mod made_lights;
 mod near;
 mod pool;
@@ -106,7 +107,7 @@ pub fn grid(input: &GridInput, options: &GridOptions, progress: &dyn Progress) -
     let surface_probes = probes.len();
     probes.extend(free::probes(input.trace, bounds, &probes));
     let free: Vec<Vec3> = probes[surface_probes..].iter().map(|probe| probe.position).collect();
-    far.extend(transport::free_rows(input, &free, options.rays));
+    far.extend(free_rows::free_rows(input, &free, options.rays));
     near.resize(far.len(), Vec::new());
     let bounds = if free.is_empty() { bounds } else { free::with_volumes(input.trace.scene, bounds) };
     let cells = tree::tree_with_free(input.trace.scene, bounds, &probes, surface_probes, options.cell_size);

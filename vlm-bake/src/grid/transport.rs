@@ -7,7 +7,7 @@ use vlm_shaders::cpu::upload::LightSet;
 use super::pool::Place;
 use super::{GridInput, StandIns, made_lights};
 use crate::progress::Progress;
-use crate::reference::{directions_above, directions_around};
+use crate::reference::directions_above;
 use crate::shade::{SurfacePoint, TraceScene};
 
 /// Irradiance per radiosity by source, ascending by source: samples, then lights.
@@ -32,19 +32,6 @@ pub fn rows(input: &GridInput, places: &[Place], rays: u32, progress: &dyn Progr
     places.par_iter().enumerate().map(row).collect()
 }
 
-/// The rows of places in free space (metres): the share of all directions in which each sees a source.
-#[must_use]
-pub fn free_rows(input: &GridInput, places: &[Vec3], rays: u32) -> Vec<Row> {
-    let made = made_lights::made_lights(input);
-    let row = |(i, &place): (usize, &Vec3)| {
-        let row = shares(input.trace, input.stand_ins, place, directions_around(rays, i as u64), rays);
-        let mut row = whole_lights(input, place, &row);
-        made_lights::add_around(input, &made, place, &mut row);
-        row
-    };
-    places.par_iter().enumerate().map(row).collect()
-}
-
 /// The row of one place, over samples alone; `seed` chooses its directions.
 #[must_use]
 pub fn transport(
@@ -55,28 +42,34 @@ pub fn transport(
     seed: u64,
 ) -> Row {
     let origin = trace.bvh.leave(surface.position, surface.geometric_normal);
-    shares(trace, stand_ins, origin, directions_above(surface, rays, seed), rays)
+    shares(trace, stand_ins, origin, directions_above(surface, rays, seed), rays, |_| ())
 }
 
-/// The share of `rays` that each sample gets of the light along some directions.
-fn shares(
+/// The share of `rays` that each sample gets of the light along some directions; those that meet one are shown to `found`.
+pub fn shares(
     trace: &TraceScene,
     stand_ins: &StandIns,
     origin: Vec3,
     directions: impl Iterator<Item = Vec3>,
     rays: u32,
+    mut found: impl FnMut(Vec3),
 ) -> Row {
     let mut met: Vec<u32> = Vec::with_capacity(rays as usize);
     for direction in directions {
         let hit = trace.path_hit(origin, direction).filter(|hit| trace.is_lit_side(hit));
-        met.extend(hit.and_then(|hit| stand_ins.sample_at(hit.triangle, hit.barycentric, hit.front)));
+        if let Some(sample) =
+            hit.and_then(|hit| stand_ins.sample_at(hit.triangle, hit.barycentric, hit.front))
+        {
+            met.push(sample);
+            found(direction);
+        }
     }
     met.sort_unstable();
     met.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as f32 / rays as f32)).collect()
 }
 
 /// Joins the samples of lights that seem small into the lights themselves.
-fn whole_lights(input: &GridInput, place: Vec3, row: &Row) -> Row {
+pub fn whole_lights(input: &GridInput, place: Vec3, row: &Row) -> Row {
     let samples = input.light_of_sample.len() as u32;
     let mut joined: Row = Vec::with_capacity(row.len());
     let mut whole: Row = Vec::new();
