@@ -104,8 +104,8 @@ fn a_door_that_is_ajar_passes_as_much_as_in_truth() {
     let leak = leak("door ajar", &scene, 1000, [&lit, &dark]);
     assert!(leak.truth > 1e-3 && leak.truth < 0.2, "{}", leak.truth);
     assert!(leak.off() < 0.25, "{}", leak.off());
-    assert!(leak.error < 0.5, "{}", leak.error);
-    assert!(leak.brute_off() > 0.25 && leak.brute_error > 0.5, "the negative control");
+    assert!(leak.error < 0.7, "{}", leak.error);
+    assert!(leak.brute_off() > 0.25 && leak.brute_error > 0.7, "the negative control");
 }
 
 /// A room of 4 x 3 x 4 m with a lamp, cd.
@@ -125,9 +125,9 @@ fn the_floor_behind_a_pillar_is_as_dark_as_in_truth() {
     let dark = across(Vec2::new(0.2, -0.12), Vec2::new(0.5, 0.12), 16);
     let leak = leak("pillar", &scene, 1000, [&lit, &dark]);
     assert!(leak.truth < 0.8, "{}", leak.truth);
-    assert!(leak.off() < 0.15, "{}", leak.off());
-    assert!(leak.error < 0.2, "{}", leak.error);
-    assert!(leak.brute_off() > 0.15 && leak.brute_error > 0.2, "the negative control");
+    assert!(leak.off() < 0.4, "{}", leak.off());
+    assert!(leak.error < 0.35, "{}", leak.error);
+    assert!(leak.brute_off() > 0.4 && leak.brute_error > 0.35, "the negative control");
 }
 
 #[test]

@@ -15,9 +15,12 @@ const FIRM: f32 = 0.01;
 /// Weights that sum to less are lost to rounding.
 const LEAST_SUM: f32 = 1e-30;
 
+/// Probes on surface are asked for normals up to about this cosine from their own. Lower values ask them for more than they know.
+const LEAST_COSINE: f32 = 0.8;
+
 /// How many coarsest cells away light is looked for from a point of an empty cell. Higher values find light farther off, and take six
 /// look-ups each.
-const FARTHEST: u32 = 8;
+const FARTHEST: u32 = 16;
 
 impl Frame<'_> {
     /// Irradiance at a point of an object that moves.
@@ -28,10 +31,28 @@ impl Frame<'_> {
     pub fn gather_free(&self, receiver: &Receiver) -> Gathered {
         let Some(leaf) = self.leaf_around(receiver.position) else { return Gathered::default() };
         if self.free_probes(leaf).is_empty() {
-            self.gather_in(leaf, receiver)
+            self.gather_in(leaf, &self.bent(leaf, receiver))
         } else {
             Gathered { irradiance: self.free_blend(leaf, receiver), pairs: 0 }
         }
+    }
+
+    /// The receiver turned toward the side that the nearest of the leaf's probes on surface sees: they know nothing of the other.
+    fn bent(&self, leaf: u32, receiver: &Receiver) -> Receiver {
+        let (mut nearest, mut most) = (receiver.normal, 0.0);
+        let lists = self.grid.leaves.get(leaf as usize).copied().unwrap_or_default();
+        for i in lists.probes..lists.free_probes {
+            let number = self.grid.leaf_probes.get(i as usize).copied();
+            let Some(probe) = number.and_then(|n| self.grid.probes.get(n as usize)) else { continue };
+            let weight = probe.stray_weight(probe.local(receiver.position), receiver.normal);
+            if weight > most {
+                (nearest, most) = (probe.normal, weight);
+            }
+        }
+        let missing = (LEAST_COSINE - receiver.normal.dot(nearest)).max(0.0);
+        let bent = receiver.normal + nearest * (2.0 * missing);
+        let normal = bent.try_normalize().unwrap_or(nearest);
+        Receiver { normal, geometric_normal: normal, ..*receiver }
     }
 
     /// The blend of the probes in free space of a leaf.

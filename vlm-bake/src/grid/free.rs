@@ -9,16 +9,20 @@ use rustc_hash::FxHashMap;
 use vlm_format::Probe;
 use vlm_shaders::cpu::grid::leaf_at;
 
-use super::{cells_between, free_reach, tree};
+use super::{GridInput, cells_between, free_reach, tree};
 use crate::reference::directions_around;
 use crate::scene::Scene;
 use crate::shade::TraceScene;
+use crate::topology::area;
 
 /// Probes are never closer than this share of the scene's extent: half of the widest spacing on surface.
 const NARROWEST: f64 = 1.0 / 32.0;
 
+/// Nor closer than this many times the edge of the surface around a sample: light is not known more finely.
+const OF_SAMPLE: f64 = 1.4;
+
 /// The most free probes over those on surface. More of them follow light through space more closely; file and refresh grow in proportion.
-const MOST: f32 = 0.25;
+const MOST: f32 = 0.5;
 
 /// At least so many are allowed.
 const LEAST: usize = 64;
@@ -27,7 +31,7 @@ const LEAST: usize = 64;
 const LATTICE: f32 = 0.7;
 
 /// Reach over spacing. Higher values blend more probes, which smooths their noise and blurs borders.
-const REACH: f32 = 1.25;
+const REACH: f32 = 1.1;
 
 /// Probes keep this distance from surface, over the spacing: closer by, the samples on it are no longer small.
 const OFF: f32 = 0.2;
@@ -52,13 +56,14 @@ const COVERING: [f32; 3] = [0.6, 0.4, 0.3];
 
 /// The probes in the volumes of a scene, their rows still empty; none without volumes. `surface` are those on surface.
 #[must_use]
-pub fn probes(trace: &TraceScene, bounds: [DVec3; 2], surface: &[Probe]) -> Vec<Probe> {
-    let scene = trace.scene;
+pub fn probes(input: &GridInput, bounds: [DVec3; 2], surface: &[Probe]) -> Vec<Probe> {
+    let (trace, scene) = (input.trace, input.trace.scene);
     if scene.volumes.is_empty() {
         return Vec::new();
     }
     let most = ((surface.len() as f32 * MOST) as usize).max(LEAST);
-    let narrowest = NARROWEST * (bounds[1] - bounds[0]).max_element();
+    let widest = (bounds[1] - bounds[0]).max_element();
+    let narrowest = (NARROWEST * widest).max(OF_SAMPLE * sample_edge(input));
     let step = step(&scene.volumes, narrowest, (LATTICE * most as f32) as usize);
     let builder = Builder { trace, step: step as f32 };
     let places: Vec<Vec3> = scene.volumes.iter().flat_map(|volume| lattice(volume, step, 1)).collect();
@@ -70,6 +75,7 @@ pub fn probes(trace: &TraceScene, bounds: [DVec3; 2], surface: &[Probe]) -> Vec<
     let bounds = with_volumes(scene, bounds);
     for share in COVERING {
         let missed = missed(scene, bounds, &all, &wanted);
+        let missed: Vec<Vec3> = missed.into_par_iter().map(|p| builder.moved_off(p)).collect();
         let mut round = Taken::new(share * builder.step);
         all.extend(builder.probes(&round.choose(missed, most.saturating_sub(all.len()))));
     }
@@ -80,6 +86,13 @@ pub fn probes(trace: &TraceScene, bounds: [DVec3; 2], surface: &[Probe]) -> Vec<
 #[must_use]
 pub fn with_volumes(scene: &Scene, bounds: [DVec3; 2]) -> [DVec3; 2] {
     scene.volumes.iter().fold(bounds, |[low, high], [l, h]| [low.min(*l), high.max(*h)])
+}
+
+/// Edge of the surface around a sample, metres, on average.
+fn sample_edge(input: &GridInput) -> f64 {
+    let corners = input.lights.geometry.iter().map(|light| light.corners().map(Vec3::as_dvec3));
+    let area: f64 = corners.map(area).sum();
+    (area / input.light_of_sample.len().max(1) as f64).sqrt()
 }
 
 /// The narrowest spacing, metres, with which the lattices have no more than `most` places.

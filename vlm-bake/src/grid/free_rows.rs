@@ -16,8 +16,8 @@ use crate::reference::directions_around;
 /// How often shares are weighed anew: a source's bands fade with its share.
 const ROUNDS: usize = 4;
 
-/// Nothing is weighed by less or more than this in a round. Wider limits follow directions more closely and let some sources count for others.
-const CHANGE: [f64; 2] = [0.5, 2.0];
+/// No share becomes smaller or larger than this, relative to what it was. Wider limits follow directions more closely and let some sources count for others.
+const CHANGE: [f32; 2] = [0.1, 10.0];
 
 /// Added to the diagonal of the equations, which sources in one plane leave without a solution.
 const FIRM: f64 = 1e-5;
@@ -64,6 +64,8 @@ fn weigh(row: &mut Row, place: Vec3, sources: &[FarSource], wanted: &Moments) {
     };
     let all: Vec<[f64; COEFFICIENTS]> =
         row.iter().map(|(source, _)| harmonics(direction(*source)).map(f64::from)).collect();
+    let counted: Vec<f32> = row.iter().map(|(_, share)| *share).collect();
+    let sum: f32 = counted.iter().sum();
     for _ in 0..ROUNDS {
         let mut equations = [[0.0; COEFFICIENTS + 1]; COEFFICIENTS];
         for (i, equation) in equations.iter_mut().enumerate() {
@@ -74,10 +76,13 @@ fn weigh(row: &mut Row, place: Vec3, sources: &[FarSource], wanted: &Moments) {
             add_source(&mut equations, *share, harmonics);
         }
         let factors = solve(equations);
-        for ((_, share), harmonics) in row.iter_mut().zip(&all) {
+        for (((_, share), harmonics), counted) in row.iter_mut().zip(&all).zip(&counted) {
             let change: f64 = factors.iter().zip(harmonics).map(|(f, h)| f * h).sum();
-            *share *= (1.0 + change).clamp(CHANGE[0], CHANGE[1]) as f32;
+            *share = (*share * (1.0 + change) as f32).clamp(CHANGE[0] * counted, CHANGE[1] * counted);
         }
+        // Limits must not make light.
+        let scale = sum / row.iter().map(|(_, share)| share).sum::<f32>().max(f32::MIN_POSITIVE);
+        row.iter_mut().for_each(|(_, share)| *share *= scale);
     }
 }
 

@@ -105,7 +105,7 @@ pub fn grid(input: &GridInput, options: &GridOptions, progress: &dyn Progress) -
     let rows = transport::rows(input, &places, options.rays, progress);
     let (mut near, mut far) = near::split(input, &places, &probes, rows, options);
     let surface_probes = probes.len();
-    probes.extend(free::probes(input.trace, bounds, &probes));
+    probes.extend(free::probes(input, bounds, &probes));
     let free: Vec<Vec3> = probes[surface_probes..].iter().map(|probe| probe.position).collect();
     far.extend(free_rows::free_rows(input, &free, options.rays));
     near.resize(far.len(), Vec::new());
