@@ -17,9 +17,6 @@ pub const COEFFICIENTS: usize = 9;
 /// The clamped cosine, by band.
 const COSINE: [f32; 3] = [PI, 2.0 * PI / 3.0, PI / 4.0];
 
-/// First coefficient of each band, and the end of the last.
-const BANDS: [usize; 4] = [0, 1, 4, COEFFICIENTS];
-
 /// Irradiance around a point of free space. 144 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -42,7 +39,11 @@ impl FreeLight {
     /// The band of a coefficient, 0 to 2.
     #[must_use]
     pub fn band(coefficient: usize) -> usize {
-        if coefficient < BANDS[1] { 0 } else { 1 + usize::from(coefficient >= BANDS[2]) }
+        match coefficient {
+            0 => 0,
+            1..4 => 1,
+            _ => 2,
+        }
     }
 
     /// What is left of each band of a source that fills this share of all directions: it counts as a disk.
@@ -57,11 +58,9 @@ impl FreeLight {
         // Radiance is radiosity / pi, the solid angle 4 pi share.
         let strength = radiosity * (4.0 * share);
         let blur = Self::blur(share);
-        for band in 0..COSINE.len() {
-            let strength = (strength * (COSINE[band] * blur[band])).extend(0.0);
-            for i in BANDS[band]..BANDS[band + 1] {
-                self.coefficients[i] += strength * harmonics[i];
-            }
+        for (i, (coefficient, harmonic)) in self.coefficients.iter_mut().zip(harmonics).enumerate() {
+            let band = Self::band(i);
+            *coefficient += (strength * (COSINE[band] * blur[band] * harmonic)).extend(0.0);
         }
     }
 }
