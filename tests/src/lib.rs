@@ -23,6 +23,7 @@ pub mod pareto;
 pub mod device;
 pub mod slope;
 pub mod room;
+pub mod rooms;
 pub mod hard_meshes;
 pub mod text;
 pub mod grid_bench;

@@ -1,89 +1,33 @@
-//! The static grid where its answer is known: walls that no light passes, lights that artists made, and no seams between cells.
+//! The static grid where its answer is known: lights that artists made, and no seams between cells.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::path::Path;
 
 use glam::{Vec2, Vec3};
-use vlm_bake::bake::bake;
-use vlm_bake::options::{BakeOptions, Preset};
-use vlm_bake::progress::Silent;
 use vlm_bake::render::LitScene;
 use vlm_bake::scene::{AuthoredMesh, LoadOptions, Scene, load};
 use vlm_bake::shade::TraceScene;
 use vlm_format::{GltfFile, VlmAsset};
-use vlm_shaders::cpu::gather::{Receiver, gather};
+use vlm_shaders::cpu::gather::Receiver;
 use vlm_shaders::cpu::gather_static::Frame;
 use vlm_shaders::cpu::grid::leaf_at;
+use vlm_tests::rooms::across;
 use vlm_tests::scenes::{Mesh, add, matte, point_light, quad};
 
 fn baked(scene: &Scene, lights: u32) -> VlmAsset {
-    let options = BakeOptions { lights, ..BakeOptions::preset(Preset::Game, scene.triangles.len()) };
-    bake(scene, &options, &Silent).unwrap().asset
-}
-
-fn floor_point(place: Vec2) -> Receiver {
-    let position = Vec3::new(place.x, 0.0, place.y);
-    Receiver { position, normal: Vec3::Y, geometric_normal: Vec3::Y, tag: 0 }
+    vlm_tests::rooms::baked(scene, lights).unwrap()
 }
 
 /// Irradiance (green) of receivers by the grid and by every light without occlusion.
 fn irradiance(scene: &Scene, asset: &VlmAsset, receivers: &[Receiver]) -> (Vec<f32>, Vec<f32>) {
-    let trace = TraceScene::new(scene);
-    let lit = LitScene::new(&trace, asset).unwrap();
-    let grid = asset.grid.as_ref().unwrap();
-    let arrived = lit.arrived(grid);
-    let frame = Frame { grid, lights: &lit.lights, arrived: &arrived };
-    let all = 0..lit.lights.len() as u32;
-    let brute = |r: &Receiver| gather(&lit.lights, &lit.radiosity, all.clone(), r).irradiance.y;
-    let by_grid = |r: &Receiver| frame.gather(r).irradiance.y;
-    (receivers.iter().map(by_grid).collect(), receivers.iter().map(brute).collect())
+    let found = vlm_tests::rooms::irradiance(scene, asset, receivers).unwrap();
+    let green = |values: Vec<Vec3>| values.into_iter().map(|e| e.y).collect();
+    (green(found.grid), green(found.brute))
 }
 
 fn mean(values: &[f32]) -> f32 {
     values.iter().sum::<f32>() / values.len() as f32
-}
-
-/// Two rooms of 4 x 3 x 4 m over one floor and under one ceiling, with a wall between them at x = 0, and a light in the left one.
-fn two_rooms(thickness: f32) -> Scene {
-    let mut scene = Scene::default();
-    let (x, y, z) = (Vec3::X, Vec3::Y, Vec3::Z);
-    let mut wall = |corner, u, v| add(&mut scene, &quad(corner, u, v, 1), matte(Vec3::splat(0.7)));
-    wall(Vec3::new(-4.0, 0.0, -2.0), 4.0 * z, 8.0 * x);
-    wall(Vec3::new(-4.0, 3.0, -2.0), 8.0 * x, 4.0 * z);
-    wall(Vec3::new(-4.0, 0.0, -2.0), 8.0 * x, 3.0 * y);
-    wall(Vec3::new(-4.0, 0.0, 2.0), 3.0 * y, 8.0 * x);
-    wall(Vec3::new(-4.0, 0.0, -2.0), 3.0 * y, 4.0 * z);
-    wall(Vec3::new(4.0, 0.0, -2.0), 4.0 * z, 3.0 * y);
-    wall(Vec3::new(-thickness / 2.0, 0.0, -2.0), 4.0 * z, 3.0 * y);
-    wall(Vec3::new(thickness / 2.0, 0.0, -2.0), 3.0 * y, 4.0 * z);
-    scene.lights.push(point_light(Vec3::new(-2.0, 1.5, 0.0), 100.0));
-    scene
-}
-
-fn across(low: Vec2, high: Vec2, count: u32) -> Vec<Receiver> {
-    let side = |i: u32| (f64::from(i) + 0.5) as f32 / count as f32;
-    let places = (0..count).flat_map(|i| (0..count).map(move |j| Vec2::new(side(i), side(j))));
-    places.map(|at| floor_point(low + at * (high - low))).collect()
-}
-
-#[test]
-fn a_wall_thinner_than_a_cell_passes_no_light() {
-    for thickness in [0.2, 0.02] {
-        let scene = two_rooms(thickness);
-        let asset = baked(&scene, 600);
-        assert!(asset.grid.as_ref().unwrap().cell_size > 2.0 * thickness);
-        let lit = across(Vec2::new(-3.9, -1.9), Vec2::new(-0.2, 1.9), 40);
-        let dark = across(Vec2::new(0.2, -1.9), Vec2::new(3.9, 1.9), 40);
-        let (lit_by_grid, _) = irradiance(&scene, &asset, &lit);
-        let (dark_by_grid, dark_by_brute) = irradiance(&scene, &asset, &dark);
-        let leak = mean(&dark_by_grid) / mean(&lit_by_grid);
-        assert!(leak < 1e-4, "{thickness} m: {leak}");
-        let worst = dark_by_grid.iter().copied().fold(0.0, f32::max) / mean(&lit_by_grid);
-        assert!(worst < 1e-3, "{thickness} m: {worst}");
-        // The negative control: without occlusion the wall passes much.
-        assert!(mean(&dark_by_brute) > 0.02 * mean(&lit_by_grid));
-    }
 }
 
 /// A floor of 8 x 8 m with a shining triangle 1 m above it, made by an artist, and perhaps a plate half-way.

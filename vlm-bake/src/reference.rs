@@ -129,6 +129,18 @@ pub fn directions_above(surface: &SurfacePoint, count: u32, seed: u64) -> impl I
     directions.filter(move |direction| direction.dot(geometric_normal) > 0.0)
 }
 
+/// `count` directions, spread evenly over the whole sphere and stratified; `seed` chooses them.
+pub fn directions_around(count: u32, seed: u64) -> impl Iterator<Item = Vec3> {
+    let shift = random_shift(seed);
+    (0..count).map(move |i| {
+        let (u, v) = shifted_hammersley(i, count, shift);
+        let (sin, cos) = (std::f32::consts::TAU * v).sin_cos();
+        let z = 1.0 - 2.0 * u;
+        let radius = (1.0 - z * z).max(0.0).sqrt();
+        Vec3::new(radius * cos, radius * sin, z)
+    })
+}
+
 /// The `i`-th of `count` points of the unit square (Hammersley 1960): stratified in both coordinates at every scale,
 /// moved around the torus by `shift`, which makes the estimate unbiased (Cranley and Patterson 1976).
 fn shifted_hammersley(i: u32, count: u32, shift: (u32, u32)) -> (f32, f32) {
@@ -168,6 +180,16 @@ mod tests {
         assert!(mean(&|d| d.x).abs() < 1e-3 && mean(&|d| d.y).abs() < 1e-3);
         assert!((mean(&|d| d.x * d.x) - 0.25).abs() < 1e-3);
         assert!((mean(&|d| d.length()) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn directions_around_a_point_have_the_moments_of_the_sphere() {
+        let mean = |f: &dyn Fn(Vec3) -> f32| directions_around(4096, 5).map(f).sum::<f32>() / 4096.0;
+        for axis in 0..3 {
+            assert!(mean(&|d| d[axis]).abs() < 1e-3);
+            assert!((mean(&|d| d[axis] * d[axis]) - 1.0 / 3.0).abs() < 1e-3);
+        }
+        assert!((mean(&|d| d.length()) - 1.0).abs() < 1e-5);
     }
 
     #[test]

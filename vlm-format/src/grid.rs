@@ -96,13 +96,15 @@ pub struct Leaf {
 /// each coordinate is divided by the probe's reach on its side, and the weight is the product of `(1 - c^2)^2` over the three,
 /// 0 where any `|c| >= 1`. Reaches end where walls begin. The normal gives a factor of its own, [`Probe::normal_weight`].
 ///
-/// In free space, light from all sides is known, the frame is the world's, and normals do not count.
+/// In free space, light from all sides is known, the frame is the world's, and normals do not count. Where [`Probe::depth`] is below a
+/// hundredth for all probes of the leaf, those that do not reach the point fade in.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Probe {
     /// Metres.
     pub position: Vec3,
-    /// Irradiance (on surface) or mean radiance times pi (in free space) per radiosity and unit of weight in the probe's row.
+    /// Per radiosity and unit of weight in the probe's row: irradiance (on surface), or the share of all directions around the probe in which
+    /// it sees the source (in free space), which is mean radiance times pi per radiosity.
     pub row_scale: f32,
     /// Unit normal; +z in free space.
     pub normal: Vec3,
@@ -131,15 +133,26 @@ impl Probe {
     /// The weight of a place given by [`Probe::local`].
     #[must_use]
     pub fn place_weight(&self, local: Vec3) -> f32 {
+        let w = self.within(local);
+        let product = w.x * w.y * w.z;
+        product * product
+    }
+
+    /// How deep within the reach a place given by [`Probe::local`] lies: 1 at the probe, 0 where the reach ends and beyond.
+    #[must_use]
+    pub fn depth(&self, local: Vec3) -> f32 {
+        self.within(local).min_element()
+    }
+
+    /// `1 - c^2` along each axis, 0 beyond the reach.
+    fn within(&self, local: Vec3) -> Vec3 {
         let [left, right, back, front] = self.reach;
         let c = Vec3::new(
             local.x / if local.x < 0.0 { left } else { right },
             local.y / if local.y < 0.0 { back } else { front },
             local.z / if local.z < 0.0 { self.reach_down } else { self.reach_up },
         );
-        let w = (1.0 - c * c).max(Vec3::ZERO);
-        let product = w.x * w.y * w.z;
-        product * product
+        (1.0 - c * c).max(Vec3::ZERO)
     }
 
     /// The weight outside of the reach, for points that no probe reaches: above 0 everywhere.
@@ -321,6 +334,8 @@ mod tests {
         assert_eq!(weight(0.0, 0.0, 0.0), 1.0);
         assert!(weight(1.9, 0.0, 0.0) > 0.0 && weight(-1.1, 0.0, 0.0) == 0.0);
         assert!(weight(0.0, 0.4, 0.0) > 0.0 && weight(0.0, 0.5, 0.0) == 0.0);
+        let depth = |x, y, z| probe.depth(probe.local(Vec3::new(x, y, z)));
+        assert_eq!((depth(0.0, 0.0, 0.0), depth(1.0, 0.0, 0.0), depth(2.0, 0.0, 0.0)), (1.0, 0.75, 0.0));
         assert_eq!((probe.normal_weight(Vec3::Y), probe.normal_weight(Vec3::X)), (1.0, 0.0));
     }
 }

@@ -25,7 +25,13 @@ impl Frame<'_> {
     /// Irradiance at a point of a surface that stands still.
     #[must_use]
     pub fn gather(&self, receiver: &Receiver) -> Gathered {
-        let Some(leaf) = leaf_at(self.grid, receiver.position) else { return Gathered::default() };
+        leaf_at(self.grid, receiver.position)
+            .map_or_else(Gathered::default, |leaf| self.gather_in(leaf, receiver))
+    }
+
+    /// [`Frame::gather`] by the probes on surface of this leaf, in which the point need not lie.
+    #[must_use]
+    pub fn gather_in(&self, leaf: u32, receiver: &Receiver) -> Gathered {
         let blend = blend(self.grid, leaf, receiver);
         let mut gathered = Gathered { irradiance: self.far_light(&blend, receiver), pairs: 0 };
         // The probes' lists ascend, so each light is met once, with all probes that see it.

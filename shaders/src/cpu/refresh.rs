@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use vlm_format::{Grid, Probe, Sample, Uncovered};
 
 use super::form_factor::LightGeometry;
+use super::free_light::{FreeLight, free_light};
 use super::upload::LightSet;
 
 /// The least cosine to the normal by which a light's direction is used: lower values follow normals that lean toward grazing light
@@ -73,9 +74,11 @@ pub struct Arrived {
     pub far: Vec<FarLight>,
     /// The radiosity that its probe sees of each near light, lx: the irradiance of its row over its form factor there.
     pub near: Vec<Vec3>,
+    /// The light around each probe in free space.
+    pub free: Vec<FreeLight>,
 }
 
-/// The light that arrives at every probe on surface; `radiosity` is that of the sources.
+/// The light that arrives at every probe; `radiosity` is that of the sources.
 #[must_use]
 pub fn refresh(grid: &Grid, lights: &LightSet, sources: &[FarSource], radiosity: &[Vec3]) -> Arrived {
     let probes = (0..grid.surface_probes as usize).into_par_iter();
@@ -85,7 +88,9 @@ pub fn refresh(grid: &Grid, lights: &LightSet, sources: &[FarSource], radiosity:
         let row_scale = grid.probes[probe].row_scale;
         grid.near_range(probe).map(move |near| near_radiosity(grid, near, row_scale, lights, radiosity))
     });
-    Arrived { far, near: near.collect() }
+    let probes = (grid.surface_probes as usize..grid.probes.len()).into_par_iter();
+    let free = probes.map(|probe| free_light(grid, probe, sources, radiosity)).collect();
+    Arrived { far, near: near.collect(), free }
 }
 
 fn near_radiosity(grid: &Grid, number: usize, row_scale: f32, lights: &LightSet, radiosity: &[Vec3]) -> Vec3 {

@@ -117,7 +117,7 @@ impl GridPasses {
         Ok(Radiosity { lights: self.read_vectors(&of_lights)?, sources: self.read_vectors(&of_sources)? })
     }
 
-    /// What arrives at the probes.
+    /// What arrives at the probes on surface.
     ///
     /// # Errors
     /// If the device is lost.
@@ -136,7 +136,8 @@ impl GridPasses {
         ];
         let groups = [self.common(&self.refresh, scene), gpu.group(&self.refresh, 1, &group)];
         self.dispatch(&self.refresh, &groups, grid.probes.len());
-        Ok(Arrived { far: self.read(&far)?, near: self.read_vectors(&near)? })
+        let (far, near) = (self.read(&far)?, self.read_vectors(&near)?);
+        Ok(Arrived { far, near, ..Arrived::default() })
     }
 
     /// Phase 2 by the grid at every receiver.

@@ -79,6 +79,28 @@ pub fn add(input: &GridInput, made: &[MadeLight], place: &Place, row: &mut Row) 
     row.sort_unstable_by_key(|(source, _)| *source);
 }
 
+/// Adds the share of all directions around a place of free space in which these lights lie.
+pub fn add_around(input: &GridInput, made: &[MadeLight], place: Vec3, row: &mut Row) {
+    let samples = input.light_of_sample.len() as u32;
+    let share = |light: &MadeLight| {
+        let whole = share_of_directions(&light.geometry, place);
+        let seen = if whole < LEAST_FORM_FACTOR { 0.0 } else { whole * seen_share(input, light, place) };
+        (seen > 0.0).then_some((samples + light.light, seen))
+    };
+    row.extend(made.iter().filter_map(share));
+    row.sort_unstable_by_key(|(source, _)| *source);
+}
+
+/// The share of all directions in which the front of a light lies (van Oosterom and Strackee, "The solid angle of a plane triangle", 1983);
+/// 0 or less behind it.
+fn share_of_directions(light: &LightGeometry, place: Vec3) -> f32 {
+    let [a, b, c] = light.corners().map(|corner| corner - place);
+    let [la, lb, lc] = [a, b, c].map(Vec3::length);
+    let numerator = -a.dot(b.cross(c));
+    let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+    numerator.atan2(denominator) / std::f32::consts::TAU
+}
+
 /// The form factor of a light at a place times the share of it that the place sees; `None` where that is nothing.
 fn seen(input: &GridInput, light: &MadeLight, place: &Place) -> Option<f32> {
     let surface = &place.surface;
@@ -90,6 +112,11 @@ fn seen(input: &GridInput, light: &MadeLight, place: &Place) -> Option<f32> {
         return None;
     }
     let origin = input.trace.bvh.leave(surface.position, surface.geometric_normal);
+    Some(whole * seen_share(input, light, origin)).filter(|&seen| seen > 0.0)
+}
+
+/// The share of a light that is seen from `origin`.
+fn seen_share(input: &GridInput, light: &MadeLight, origin: Vec3) -> f32 {
     let is_seen = |look: &&Look| {
         let way = look.at - origin;
         let distance = way.length();
@@ -97,6 +124,19 @@ fn seen(input: &GridInput, light: &MadeLight, place: &Place) -> Option<f32> {
         let most = 1.0 - look.depth / (distance * cosine.max(LEAST_COSINE));
         most <= 0.0 || !input.trace.is_occluded(origin, way, most)
     };
-    let share = light.looks.iter().filter(is_seen).count() as f32 / light.looks.len().max(1) as f32;
-    Some(whole * share).filter(|&seen| seen > 0.0)
+    light.looks.iter().filter(is_seen).count() as f32 / light.looks.len().max(1) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_face_of_an_octahedron_fills_an_eighth_of_the_directions_before_it() {
+        // Its front looks at the origin.
+        let light = LightGeometry::new([DVec3::X, DVec3::Z, DVec3::Y]);
+        let share = share_of_directions(&light, Vec3::ZERO);
+        assert!((share - 0.125).abs() < 1e-5, "{share}");
+        assert!(share_of_directions(&light, Vec3::splat(2.0)) < 0.0);
+    }
 }

@@ -6,8 +6,13 @@
 //! evaluates their form factor at each pixel, times the share of it that the probes see. All others are *far*: the frame sums them once per
 //! probe, and pixels blend their probes.
 //!
-//! Steps: `stand_in -> pool -> spacing -> reach -> transport, made_lights -> near -> tree`.
+//! Receivers that move find **free** probes in the volumes that artists mark, with light from all sides.
+//!
+//! Steps: `stand_in -> pool -> spacing -> reach -> transport, made_lights -> near -> free -> tree`.
 
+mod free;
+mod free_reach;
+mod free_rows;
 mod made_lights;
 mod near;
 mod pool;
@@ -130,9 +135,16 @@ fn built(
     if progress.is_cancelled() {
         return None;
     }
-    let (near, far) = near::split(input, &places, &probes, rows, options);
-    let cells = tree::tree(input.trace.scene, bounds, &probes, options.cell_size);
+    let (mut near, mut far) = near::split(input, &places, &probes, rows, options);
+    let surface_probes = probes.len();
+    probes.extend(free::probes(input, bounds, &probes));
+    let free: Vec<Vec3> = probes[surface_probes..].iter().map(|probe| probe.position).collect();
+    far.extend(free_rows::free_rows(input, &free, options.rays));
+    near.resize(far.len(), Vec::new());
+    let bounds = if free.is_empty() { bounds } else { free::with_volumes(input.trace.scene, bounds) };
+    let cells = tree::tree_with_free(input.trace.scene, bounds, &probes, surface_probes, options.cell_size);
     let mut grid = encode(cells, probes, &near, &far, input.light_of_sample);
+    grid.surface_probes = surface_probes as u32;
     grid.sample_shares = input.shares.to_vec();
     grid.surface_gains = input.gains.to_vec();
     grid.uncovered = input.uncovered.to_vec();
@@ -177,7 +189,6 @@ fn encode(
         grid.near_starts.push(grid.near.len() as u32);
     }
     near_rows.into_iter().for_each(|(first, row)| rows.push(first, row));
-    grid.surface_probes = probes.len() as u32;
     grid.probes = probes;
     grid.row_starts = rows.starts;
     grid.rows = rows.words;

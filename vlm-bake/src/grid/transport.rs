@@ -1,5 +1,6 @@
 //! What share of a probe's light comes from which surface, by rays over its hemisphere.
 
+use glam::Vec3;
 use rayon::prelude::*;
 use vlm_shaders::cpu::upload::LightSet;
 
@@ -27,7 +28,7 @@ pub fn rows(input: &GridInput, places: &[Place], rays: u32, progress: &dyn Progr
         }
         progress.advance(1);
         let row = transport(input.trace, input.stand_ins, &place.surface, rays, i as u64);
-        let mut row = whole_lights(input, place, &row);
+        let mut row = whole_lights(input, place.surface.position, &row);
         made_lights::add(input, &made, place, &mut row);
         row
     };
@@ -44,17 +45,34 @@ pub fn transport(
     seed: u64,
 ) -> Row {
     let origin = trace.bvh.leave(surface.position, surface.geometric_normal);
+    shares(trace, stand_ins, origin, directions_above(surface, rays, seed), rays, |_| ())
+}
+
+/// The share of `rays` that each sample gets of the light along some directions; those that meet one are shown to `found`.
+pub fn shares(
+    trace: &TraceScene,
+    stand_ins: &StandIns,
+    origin: Vec3,
+    directions: impl Iterator<Item = Vec3>,
+    rays: u32,
+    mut found: impl FnMut(Vec3),
+) -> Row {
     let mut met: Vec<u32> = Vec::with_capacity(rays as usize);
-    for direction in directions_above(surface, rays, seed) {
+    for direction in directions {
         let hit = trace.path_hit(origin, direction).filter(|hit| trace.is_lit_side(hit));
-        met.extend(hit.and_then(|hit| stand_ins.sample_at(hit.triangle, hit.barycentric, hit.front)));
+        if let Some(sample) =
+            hit.and_then(|hit| stand_ins.sample_at(hit.triangle, hit.barycentric, hit.front))
+        {
+            met.push(sample);
+            found(direction);
+        }
     }
     met.sort_unstable();
     met.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as f32 / rays as f32)).collect()
 }
 
 /// Joins the samples of lights that seem small into the lights themselves.
-fn whole_lights(input: &GridInput, place: &Place, row: &Row) -> Row {
+pub fn whole_lights(input: &GridInput, place: Vec3, row: &Row) -> Row {
     let samples = input.light_of_sample.len() as u32;
     let mut joined: Row = Vec::with_capacity(row.len());
     let mut whole: Row = Vec::new();
@@ -72,7 +90,7 @@ fn whole_lights(input: &GridInput, place: &Place, row: &Row) -> Row {
     joined
 }
 
-fn seems_small(lights: &LightSet, light: u32, place: &Place) -> bool {
+fn seems_small(lights: &LightSet, light: u32, place: Vec3) -> bool {
     let geometry = &lights.geometry[light as usize];
-    geometry.longest_edge() < WHOLE * geometry.centroid().distance(place.surface.position)
+    geometry.longest_edge() < WHOLE * geometry.centroid().distance(place)
 }

@@ -19,26 +19,39 @@ pub const DEFAULT_CELLS: f64 = 16.0;
 /// How often a cell is divided at most.
 const DEEPEST: u32 = 6;
 
-/// Divides the cells that hold surface: a grid whose probes have no rows yet.
+/// Divides the cells that hold surface: a grid whose probes, all on surface, have no rows yet.
 #[must_use]
 pub fn tree(scene: &Scene, bounds: [DVec3; 2], probes: &[Probe], cell_size: Option<f32>) -> Grid {
+    tree_with_free(scene, bounds, probes, probes.len(), cell_size)
+}
+
+/// [`tree`] with cells for probes in free space, too, which stand after so many on surface.
+#[must_use]
+pub fn tree_with_free(
+    scene: &Scene,
+    bounds: [DVec3; 2],
+    probes: &[Probe],
+    surface_probes: usize,
+    cell_size: Option<f32>,
+) -> Grid {
     let mut grid = lattice(bounds, cell_size);
     let size = f64::from(grid.cell_size);
     let roots: usize = grid.dimensions.iter().map(|&d| d as usize).product();
     let corner = |cell: IVec3| grid.origin.as_dvec3() + cell.as_dvec3() * size;
     let triangles = triangles_by_cell(scene, &grid, roots);
     let probes_of = probes_by_cell(probes, &grid, roots);
-    let builder = Builder { scene, probes };
+    let builder = Builder { scene, probes, surface_probes };
     let built: Vec<Node> = (0..roots)
         .into_par_iter()
         .map(|cell| {
             let place = cell_place(cell, grid.dimensions);
             let bounds = Cube { low: corner(place), size };
-            builder.node(&bounds, triangles.of(cell), probes_of.of(cell), 0)
+            let (surface, free) = builder.kinds(probes_of.of(cell));
+            builder.node(&bounds, triangles.of(cell), surface, free, 0)
         })
         .collect();
     grid.probes = probes.to_vec();
-    grid.surface_probes = probes.len() as u32;
+    grid.surface_probes = surface_probes as u32;
     grid.cells = vec![0; roots];
     built.into_iter().enumerate().for_each(|(cell, node)| store(&mut grid, cell, node));
     let end = grid.leaf_probes.len() as u32;
@@ -112,42 +125,81 @@ impl Cube {
 /// A cell with what it holds.
 enum Node {
     Empty,
-    Leaf(Vec<u32>),
+    /// Probes on surface, and in free space.
+    Leaf(Vec<u32>, Vec<u32>),
     Divided(Box<[Node; 8]>),
 }
 
 struct Builder<'a> {
     scene: &'a Scene,
     probes: &'a [Probe],
+    /// The rest lies in free space.
+    surface_probes: usize,
 }
 
 impl Builder<'_> {
-    fn node(&self, cube: &Cube, triangles: &[u32], around: &[u32], depth: u32) -> Node {
+    /// Probes on surface and in free space, of an ascending list.
+    fn kinds<'l>(&self, probes: &'l [u32]) -> (&'l [u32], &'l [u32]) {
+        probes.split_at(probes.partition_point(|&p| (p as usize) < self.surface_probes))
+    }
+
+    fn node(&self, cube: &Cube, triangles: &[u32], around: &[u32], free: &[u32], depth: u32) -> Node {
         let triangles: Vec<u32> =
             triangles.iter().copied().filter(|&t| triangle_meets(self.scene, t, cube)).collect();
-        if triangles.is_empty() || around.is_empty() {
+        let mut probes =
+            if triangles.is_empty() { Vec::new() } else { self.reaching_or_nearest(around, cube) };
+        let free = self.free(free, cube);
+        if probes.is_empty() && free.is_empty() {
             return Node::Empty;
         }
+        let is_fine = probes.len() <= MOST_PROBES && !self.divides_free(&free, cube);
+        if is_fine || depth == DEEPEST {
+            self.keep_nearest(&mut probes, cube);
+            return Node::Leaf(probes, free);
+        }
+        let child = |octant| self.node(&cube.child(octant), &triangles, &probes, &free, depth + 1);
+        Node::Divided(Box::new(std::array::from_fn(child)))
+    }
+
+    /// The probes that reach the cell. Where none does, all of the larger cell, as far as a leaf may list them.
+    fn reaching_or_nearest(&self, around: &[u32], cube: &Cube) -> Vec<u32> {
         let mut probes: Vec<u32> =
             around.iter().copied().filter(|&p| probe_meets(&self.probes[p as usize], cube)).collect();
         if probes.is_empty() {
-            // Surface that no probe reaches takes those of the larger cell.
             probes = around.to_vec();
             self.keep_nearest(&mut probes, cube);
         }
-        if probes.len() <= MOST_PROBES {
-            return Node::Leaf(probes);
+        probes
+    }
+
+    /// Likewise in free space; within a volume none of its cells stays empty.
+    fn free(&self, around: &[u32], cube: &Cube) -> Vec<u32> {
+        let (first, end) = (self.surface_probes as u32, self.probes.len() as u32);
+        let meets = |[low, high]: &[DVec3; 2]| cube.meets_box(*low, *high);
+        if first == end {
+            return Vec::new();
         }
-        if depth == DEEPEST {
-            self.keep_nearest(&mut probes, cube);
-            return Node::Leaf(probes);
+        let reaching: Vec<u32> =
+            around.iter().copied().filter(|&p| probe_meets(&self.probes[p as usize], cube)).collect();
+        if !reaching.is_empty() || !self.scene.volumes.iter().any(meets) {
+            return reaching;
         }
-        let child = |octant| self.node(&cube.child(octant), &triangles, &probes, depth + 1);
-        Node::Divided(Box::new(std::array::from_fn(child)))
+        let mut nearest = if around.is_empty() { (first..end).collect() } else { around.to_vec() };
+        self.keep_nearest(&mut nearest, cube);
+        nearest
+    }
+
+    /// True where dividing a cell shortens its list of probes in free space, which overlap: below their reach it would not.
+    fn divides_free(&self, free: &[u32], cube: &Cube) -> bool {
+        let reach = |&p: &u32| f64::from(self.probes[p as usize].reach.iter().copied().fold(0.0, f32::max));
+        free.len() > MOST_PROBES && cube.size > free.iter().map(reach).fold(0.0, f64::max)
     }
 
     /// Of too many probes those stay that weigh most in the middle of the cell.
     fn keep_nearest(&self, probes: &mut Vec<u32>, cube: &Cube) {
+        if probes.len() <= MOST_PROBES {
+            return;
+        }
         let middle = (cube.low + 0.5 * cube.size).as_vec3();
         let away = |&p: &u32| {
             let probe = &self.probes[p as usize];
@@ -163,12 +215,13 @@ impl Builder<'_> {
 fn store(grid: &mut Grid, cell: usize, node: Node) {
     match node {
         Node::Empty => {}
-        Node::Leaf(probes) => {
+        Node::Leaf(probes, free) => {
             grid.cells[cell] = 2 * grid.leaves.len() as u32 + 1;
             let start = grid.leaf_probes.len() as u32;
             grid.leaf_probes.extend(probes);
-            let end = grid.leaf_probes.len() as u32;
-            grid.leaves.push(Leaf { probes: start, free_probes: end });
+            let free_probes = grid.leaf_probes.len() as u32;
+            grid.leaf_probes.extend(free);
+            grid.leaves.push(Leaf { probes: start, free_probes });
         }
         Node::Divided(children) => {
             let first = grid.cells.len();

@@ -131,7 +131,15 @@ pub(super) fn place(
     Ok(degenerate)
 }
 
-fn world_positions(local: &LocalMesh, placement: &Placement, file: &str) -> Result<Vec<Vec3>, Error> {
+/// The vertices in world space.
+///
+/// # Errors
+/// [`Error::NotFinite`] if the transform takes one beyond what `f32` holds.
+pub(super) fn world_positions(
+    local: &LocalMesh,
+    placement: &Placement,
+    file: &str,
+) -> Result<Vec<Vec3>, Error> {
     let place = |p: &Vec3| placement.world_from_local.transform_point3(p.as_dvec3()).as_vec3();
     let world: Vec<Vec3> = local.positions.iter().map(place).collect();
     if world.iter().all(|p| p.is_finite()) {

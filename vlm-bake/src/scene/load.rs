@@ -4,6 +4,7 @@ use super::deform;
 use super::geometry::{self, LocalMesh, Placement};
 use super::material::{self, MaterialTable, TextureRequest};
 use super::node::{self, PlacedNode};
+use super::volume::Boxes;
 use super::{Object, Scene, authored, camera, decode, light, steering};
 use glam::DMat4;
 use std::collections::{BTreeMap, BTreeSet};
@@ -151,6 +152,9 @@ impl<'a> Loader<'a> {
         if parts.is_empty() {
             return Ok(());
         }
+        if request.volume {
+            return self.add_volume(placed, mesh, parts);
+        }
         let object = self.scene.objects.len() as u32;
         self.scene.objects.push(Object {
             node: node.index() as u32,
@@ -166,20 +170,59 @@ impl<'a> Loader<'a> {
         Ok(())
     }
 
-    fn add_part(
+    /// A mesh that marks a volume: only its boxes stay.
+    fn add_volume(
         &mut self,
         placed: &PlacedNode,
         mesh: &gltf::Mesh,
+        parts: Vec<(gltf::Primitive, Rc<LocalMesh>)>,
+    ) -> Result<(), Error> {
+        let mut boxes = Boxes::default();
+        for (primitive, local) in parts {
+            let (local, skinned) = self.posed(placed, &primitive, local)?;
+            let instances = deform::instances(self.file, &placed.node)?;
+            for (instance, node_from_instance) in instances.into_iter().enumerate() {
+                let world_from_local = placed.world_from_node * node_from_instance;
+                let placement = Placement {
+                    world_from_local: if skinned { DMat4::IDENTITY } else { world_from_local },
+                    mirrored: false,
+                    object: 0,
+                    mesh: mesh.index() as u32,
+                    primitive: primitive.index() as u32,
+                    material: 0,
+                };
+                boxes.add(instance, &geometry::world_positions(&local, &placement, self.file.name())?);
+            }
+        }
+        self.scene.volumes.extend(boxes.finish());
+        Ok(())
+    }
+
+    /// A primitive in the pose that the file holds, and whether that is in world space already, by a skin.
+    fn posed(
+        &self,
+        placed: &PlacedNode,
         primitive: &gltf::Primitive,
         mut local: Rc<LocalMesh>,
-        object: u32,
-        draft: Option<&mut authored::Draft>,
-    ) -> Result<(), Error> {
+    ) -> Result<(Rc<LocalMesh>, bool), Error> {
         if primitive.morph_targets().len() > 0 {
             deform::morph(self.file, &placed.node, primitive, Rc::make_mut(&mut local))?;
         }
         let skinned = placed.node.skin().is_some()
             && deform::skin(self.file, self.nodes, &placed.node, primitive, Rc::make_mut(&mut local))?;
+        Ok((local, skinned))
+    }
+
+    fn add_part(
+        &mut self,
+        placed: &PlacedNode,
+        mesh: &gltf::Mesh,
+        primitive: &gltf::Primitive,
+        local: Rc<LocalMesh>,
+        object: u32,
+        draft: Option<&mut authored::Draft>,
+    ) -> Result<(), Error> {
+        let (local, skinned) = self.posed(placed, primitive, local)?;
         self.skinned += usize::from(skinned);
 
         let last = self.table.materials.len() - 1;
@@ -233,6 +276,8 @@ impl<'a> Loader<'a> {
     fn why_empty(&self) -> &'static str {
         if self.scene.degenerate_triangles > 0 {
             "none of its triangles has an area; check the scale of its nodes"
+        } else if !self.scene.volumes.is_empty() {
+            "all its meshes are volumes for moving objects or authored VLMs; export the visible surfaces along with them"
         } else if !self.drafts.is_empty() {
             "all its meshes are named as authored VLMs; export the visible surfaces along with them"
         } else if !self.pointless.is_empty() {

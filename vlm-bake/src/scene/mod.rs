@@ -1,6 +1,6 @@
 //! The visible scene: world-space triangles, materials, punctual lights and cameras, read from glTF.
 
-use glam::{DMat4, Vec2, Vec3};
+use glam::{DMat4, DVec3, Vec2, Vec3};
 
 /// Everything that the stages after this one know of the glTF file.
 ///
@@ -38,6 +38,9 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// Authored light meshes: they are not part of the visible triangles.
     pub authored: Vec<AuthoredMesh>,
+    /// Boxes in which moving objects need light, least and largest corner of each in world space, metres: those around meshes that
+    /// `extras.vlm.volume` marks, which are no part of the visible triangles.
+    pub volumes: Vec<[DVec3; 2]>,
     /// Triangles of the file that were left out because their area is within the rounding of their coordinates.
     pub degenerate_triangles: usize,
     /// What was left out or guessed, for the user to read: place and reason.
@@ -209,6 +212,7 @@ mod decode;
 pub mod texture;
 mod surface;
 mod authored;
+mod volume;
 mod light;
 mod camera;
 mod defaults;

@@ -5,7 +5,7 @@ use glam::Vec3;
 use serde_json::Value;
 
 /// Every key of `extras.vlm`.
-const KEYS: [&str; 6] = ["intensity", "tint", "tag", "exclude", "density", "mode"];
+const KEYS: [&str; 7] = ["intensity", "tint", "tag", "exclude", "density", "mode", "volume"];
 
 /// What a node and its mesh ask for together.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -13,6 +13,8 @@ pub(super) struct Request {
     pub steering: Steering,
     /// The mesh is an authored VLM.
     pub authored: Option<AuthoredMode>,
+    /// The mesh is no surface and no VLM: its box is where moving objects need light.
+    pub volume: bool,
 }
 
 /// Reads `extras.vlm` of a node and of its mesh; where both have a key, the node's counts.
@@ -80,6 +82,7 @@ fn apply(extras: &Value, request: &mut Request, place: &Place) -> Result<(), Err
     )?;
     set(extras, "exclude", "true or false", place, boolean, &mut steering.exclude)?;
     set(extras, "density", "a number above 0", place, positive, &mut steering.density)?;
+    set(extras, "volume", "true or false", place, boolean, &mut request.volume)?;
     set(
         extras,
         "mode",
@@ -203,7 +206,7 @@ mod tests {
             exclude: true,
             density: 0.5,
         };
-        assert_eq!(read_json(&json).unwrap(), Request { steering: expected, authored: None });
+        assert_eq!(read_json(&json).unwrap(), Request { steering: expected, ..Request::default() });
     }
 
     #[test]
@@ -221,6 +224,15 @@ mod tests {
     }
 
     #[test]
+    fn the_node_decides_whether_its_mesh_is_a_volume() {
+        let json =
+            |node: Value| json!({ "meshes": [{ "extras": { "vlm": { "volume": true } } }], "nodes": [node] });
+        assert!(read_json(&json(json!({}))).unwrap().volume);
+        assert!(!read_json(&json(json!({ "extras": { "vlm": { "volume": false } } }))).unwrap().volume);
+        assert!(!read_json(&json!({ "nodes": [{}] })).unwrap().volume);
+    }
+
+    #[test]
     fn wrong_types_are_named_with_their_pointer() {
         let cases = [
             (json!(3), "/nodes/0/extras/vlm"),
@@ -234,6 +246,7 @@ mod tests {
             (json!({ "exclude": "yes" }), "/nodes/0/extras/vlm/exclude"),
             (json!({ "density": 0 }), "/nodes/0/extras/vlm/density"),
             (json!({ "mode": "multiply" }), "/nodes/0/extras/vlm/mode"),
+            (json!({ "volume": "yes" }), "/nodes/0/extras/vlm/volume"),
         ];
         for (extras, expected) in cases {
             let error = read_json(&json!({ "nodes": [{ "extras": { "vlm": extras } }] })).unwrap_err();

@@ -27,6 +27,20 @@ fn authored_meshes_are_not_visible() {
 }
 
 #[test]
+fn volumes_are_boxes_and_nothing_else() {
+    let node = json!({
+        "name": "Sky-vlm", "mesh": 0, "translation": [0, 0, 3], "scale": [2, 2, 2],
+        "extras": { "vlm": { "volume": true } },
+    });
+    let scene = with_authored(&node).load().unwrap();
+    assert_eq!((scene.triangles.len(), scene.objects.len(), scene.authored.len()), (1, 1, 0));
+    let points = CORNERS.map(|p| (Vec3::from(p) * 2.0 + Vec3::Z * 3.0).as_dvec3());
+    let low = points.into_iter().reduce(|a, b| a.min(b)).unwrap();
+    let high = points.into_iter().reduce(|a, b| a.max(b)).unwrap();
+    assert_eq!(scene.volumes, [[low, high]]);
+}
+
+#[test]
 fn authored_meshes_take_colour_and_emission_from_their_material() {
     let mut builder = with_authored(&json!({ "name": "VLM_sky", "mesh": 0 }));
     builder.material(json!({

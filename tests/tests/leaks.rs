@@ -1,0 +1,170 @@
+//! Light where there should be little: behind walls, doors, pillars and tables, by the grid and in truth.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use glam::{Vec2, Vec3};
+use vlm_bake::bake::bake;
+use vlm_bake::gbuffer::GBuffer;
+use vlm_bake::options::{BakeOptions, Preset};
+use vlm_bake::progress::Silent;
+use vlm_bake::reference::indirect_irradiance;
+use vlm_bake::render::gather_by_grid;
+use vlm_bake::scene::{LoadOptions, Scene, load};
+use vlm_bake::shade::TraceScene;
+use vlm_format::GltfFile;
+use vlm_shaders::cpu::gather::Receiver;
+use vlm_tests::assets;
+use vlm_tests::rooms::{
+    ALBEDO, across, add_room, baked, irradiance, mean, relative_rmse, slab, truth, turned, two_rooms,
+};
+use vlm_tests::scenes::{add, matte, point_light};
+
+/// Directions of the truth.
+const SPP: u32 = 4096;
+
+/// Light of the dark side over that of the lit side, and how far the dark side is from the truth.
+struct Leak {
+    grid: f32,
+    brute: f32,
+    truth: f32,
+    /// Relative RMSE of the dark side.
+    error: f32,
+    brute_error: f32,
+}
+
+fn leak(name: &str, scene: &Scene, lights: u32, [lit, dark]: [&[Receiver]; 2]) -> Leak {
+    let asset = baked(scene, lights).unwrap();
+    let [lit_found, dark_found] = [lit, dark].map(|r| irradiance(scene, &asset, r).unwrap());
+    let [lit_truth, dark_truth] = [lit, dark].map(|r| truth(scene, r, SPP));
+    let leak = Leak {
+        grid: mean(&dark_found.grid) / mean(&lit_found.grid),
+        brute: mean(&dark_found.brute) / mean(&lit_found.brute),
+        truth: mean(&dark_truth) / mean(&lit_truth),
+        error: relative_rmse(&dark_found.grid, &dark_truth),
+        brute_error: relative_rmse(&dark_found.brute, &dark_truth),
+    };
+    println!(
+        "{name}: dark over lit {:.5} by the grid, {:.5} in truth, {:.5} without occlusion; relative RMSE {:.3}, {:.3} without occlusion",
+        leak.grid, leak.truth, leak.brute, leak.error, leak.brute_error
+    );
+    leak
+}
+
+impl Leak {
+    /// How far the dark side's share of the lit side's light is from the truth's, relative to it.
+    fn off(&self) -> f32 {
+        (self.grid / self.truth - 1.0).abs()
+    }
+
+    fn brute_off(&self) -> f32 {
+        (self.brute / self.truth - 1.0).abs()
+    }
+}
+
+#[test]
+fn a_wall_thinner_than_a_cell_passes_no_light() {
+    for thickness in [0.2, 0.02] {
+        let scene = two_rooms(thickness);
+        let asset = baked(&scene, 600).unwrap();
+        assert!(asset.grid.as_ref().unwrap().cell_size > 2.0 * thickness);
+        let lit = across(Vec2::new(-3.9, -1.9), Vec2::new(-0.2, 1.9), 40);
+        let dark = across(Vec2::new(0.2, -1.9), Vec2::new(3.9, 1.9), 40);
+        let bright = mean(&irradiance(&scene, &asset, &lit).unwrap().grid);
+        let dark = irradiance(&scene, &asset, &dark).unwrap();
+        let worst = dark.grid.iter().map(|e| e.max_element()).fold(0.0, f32::max) / bright;
+        let (by_grid, by_brute) = (mean(&dark.grid) / bright, mean(&dark.brute) / bright);
+        println!(
+            "wall of {thickness} m: dark over lit {by_grid}, at worst {worst}; without occlusion {by_brute}"
+        );
+        assert!(by_grid < 1e-4 && worst < 1e-3, "{thickness} m: {by_grid} {worst}");
+        // The negative control: without occlusion the wall passes much.
+        assert!(by_brute > 0.02);
+    }
+}
+
+/// Two rooms with a doorway of 0.9 x 2 m between them, whose door stands `degrees` open.
+fn door(degrees: f32) -> Scene {
+    let mut scene = Scene::default();
+    add_room(&mut scene, Vec3::new(-4.0, 0.0, -2.0), Vec3::new(4.0, 3.0, 2.0), &matte(ALBEDO));
+    let mut wall = |low: Vec3, high: Vec3| add(&mut scene, &slab(low, high), matte(ALBEDO));
+    wall(Vec3::new(-0.05, 0.0, -2.0), Vec3::new(0.05, 3.0, -0.45));
+    wall(Vec3::new(-0.05, 0.0, 0.45), Vec3::new(0.05, 3.0, 2.0));
+    wall(Vec3::new(-0.05, 2.0, -0.45), Vec3::new(0.05, 3.0, 0.45));
+    let leaf = slab(Vec3::new(0.01, 0.0, -0.45), Vec3::new(0.05, 2.0, 0.45));
+    add(&mut scene, &turned(leaf, Vec3::new(0.05, 0.0, -0.45), degrees), matte(ALBEDO));
+    scene.lights.push(point_light(Vec3::new(-1.5, 2.5, -1.2), 100.0));
+    scene
+}
+
+#[test]
+fn a_door_that_is_ajar_passes_as_much_as_in_truth() {
+    let scene = door(10.0);
+    let lit = across(Vec2::new(-3.9, -1.9), Vec2::new(-0.2, 1.9), 24);
+    let dark = across(Vec2::new(0.5, -1.9), Vec2::new(3.9, 1.9), 24);
+    let leak = leak("door ajar", &scene, 1000, [&lit, &dark]);
+    assert!(leak.truth > 1e-3 && leak.truth < 0.2, "{}", leak.truth);
+    assert!(leak.off() < 0.25, "{}", leak.off());
+    assert!(leak.error < 0.7, "{}", leak.error);
+    assert!(leak.brute_off() > 0.25 && leak.brute_error > 0.7, "the negative control");
+}
+
+/// A room of 4 x 3 x 4 m with a lamp, cd.
+fn room(lamp: Vec3) -> Scene {
+    let mut scene = Scene::default();
+    add_room(&mut scene, Vec3::new(-2.0, 0.0, -2.0), Vec3::new(2.0, 3.0, 2.0), &matte(ALBEDO));
+    scene.lights.push(point_light(lamp, 100.0));
+    scene
+}
+
+#[test]
+fn the_floor_behind_a_pillar_is_as_dark_as_in_truth() {
+    // The wall beside the lamp is most of the light.
+    let mut scene = room(Vec3::new(-1.85, 1.0, 0.0));
+    add(&mut scene, &slab(Vec3::new(-0.15, 0.0, -0.15), Vec3::new(0.15, 3.0, 0.15)), matte(ALBEDO));
+    let lit = across(Vec2::new(0.2, -1.2), Vec2::new(0.5, -0.9), 16);
+    let dark = across(Vec2::new(0.2, -0.12), Vec2::new(0.5, 0.12), 16);
+    let leak = leak("pillar", &scene, 1000, [&lit, &dark]);
+    assert!(leak.truth < 0.8, "{}", leak.truth);
+    assert!(leak.off() < 0.4, "{}", leak.off());
+    assert!(leak.error < 0.35, "{}", leak.error);
+    assert!(leak.brute_off() > 0.4 && leak.brute_error > 0.35, "the negative control");
+}
+
+#[test]
+fn the_floor_below_a_table_is_as_dark_as_in_truth() {
+    let mut scene = room(Vec3::new(0.0, 2.2, 0.0));
+    add(&mut scene, &slab(Vec3::new(-0.7, 0.71, -0.5), Vec3::new(0.7, 0.75, 0.5)), matte(ALBEDO));
+    for (x, z) in [(-0.65, -0.45), (0.6, -0.45), (-0.65, 0.4), (0.6, 0.4)] {
+        let leg = slab(Vec3::new(x, 0.0, z), Vec3::new(x + 0.05, 0.71, z + 0.05));
+        add(&mut scene, &leg, matte(ALBEDO));
+    }
+    let lit = across(Vec2::new(1.2, -0.5), Vec2::new(1.8, 0.5), 16);
+    let dark = across(Vec2::new(-0.5, -0.35), Vec2::new(0.5, 0.35), 16);
+    let leak = leak("table", &scene, 1000, [&lit, &dark]);
+    assert!(leak.truth < 0.6, "{}", leak.truth);
+    assert!(leak.off() < 0.15, "{}", leak.off());
+    assert!(leak.error < 0.2, "{}", leak.error);
+    assert!(leak.brute_off() > 0.15 && leak.brute_error > 0.2, "the negative control");
+}
+
+#[test]
+#[cfg_attr(not(has_scenes), ignore = "the scenes are neither in VLM_ASSETS nor in ../shared/assets")]
+fn veach_ajar_is_as_bright_as_in_truth() {
+    let file = GltfFile::open(&assets::find("scenes/veach_ajar.glb").unwrap()).unwrap();
+    let scene = load(&file, &LoadOptions::default()).unwrap();
+    let options = BakeOptions::preset(Preset::Game, scene.triangles.len());
+    let asset = bake(&scene, &options, &Silent).unwrap().asset;
+    let trace = TraceScene::new(&scene);
+    let view = GBuffer::trace(&trace, &scene.cameras[0], 64, 36);
+    let truth = indirect_irradiance(&trace, &view.points, view.width, 256, &Silent);
+    let (found, _) = gather_by_grid(&trace, &asset, &view, &Silent).unwrap();
+    let (brute, _) = vlm_bake::render::gather_brute(&trace, &asset, &view, &Silent).unwrap();
+    let ratio = mean(&found) / mean(&truth);
+    let brute = mean(&brute) / mean(&truth);
+    println!(
+        "veach_ajar: mean over the truth's {ratio}, {brute} without occlusion; relative RMSE {}",
+        relative_rmse(&found, &truth)
+    );
+    assert!((ratio - 1.0).abs() < 0.25, "{ratio}");
+    assert!((brute - 1.0).abs() > 0.25, "the negative control");
+}
