@@ -312,7 +312,7 @@ pub(super) mod tests {
         (Code::VlmLength, "/grid/row_starts", |a| grid(a).row_starts.insert(0, 0)),
         (Code::VlmOrder, "/grid/row_starts", |a| grid(a).row_starts[0] = 1),
         (Code::VlmLength, "/grid/rows", |a| grid(a).rows.push(0)),
-        (Code::VlmLength, "/grid/rows", |a| grid(a).row_starts[1] = 3),
+        (Code::VlmLength, "/grid/rows", |a| grid(a).row_starts[2] = 3),
         (Code::VlmIndex, "/grid/rows/0", |a| set_rows(grid(a), 5, 0)),
         (Code::VlmIndex, "/grid/rows/1", |a| set_rows(grid(a), 0, 5)),
     ];
