@@ -97,9 +97,9 @@ pub fn grid(input: &GridInput, options: &GridOptions, progress: &dyn Progress) -
         rays: (options.rays as f32 * ROUGH_RAYS) as u32,
         ..*options
     };
-    let rough = built(input, &pool, bounds, &rough, progress)?;
+    let rough = built(input, &pool, bounds, &rough, Pass::Rough, progress)?;
     refine::refine(input, &mut pool, &rough);
-    built(input, &pool, bounds, options, progress)
+    built(input, &pool, bounds, options, Pass::Final, progress)
 }
 
 /// Share of the probes for the grid that tells where probes should lie closer. More of them find smaller places.
@@ -108,12 +108,22 @@ const ROUGH_PROBES: f32 = 0.5;
 /// Likewise of the rays. Fewer of them take noise for error.
 const ROUGH_RAYS: f32 = 0.25;
 
+/// What a grid is built for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Pass {
+    /// To learn where probes should lie closer, on surface alone.
+    Rough,
+    /// To be written.
+    Final,
+}
+
 /// The grid whose probes' spacing follows the openness of the pool; `None` if it was cancelled.
 fn built(
     input: &GridInput,
     pool: &[Place],
     bounds: [DVec3; 2],
     options: &GridOptions,
+    pass: Pass,
     progress: &dyn Progress,
 ) -> Option<Grid> {
     let spacing = spacing::Spacing::new(pool, bounds, options.probes);
@@ -130,14 +140,17 @@ fn built(
         chosen.extend(more);
     }
     let places: Vec<_> = chosen.iter().map(|&i| pool[i as usize]).collect();
-    progress.begin("transport", places.len() as u64);
+    let stage = if pass == Pass::Rough { "rough transport" } else { "transport" };
+    progress.begin(stage, places.len() as u64);
     let rows = transport::rows(input, &places, options.rays, progress);
     if progress.is_cancelled() {
         return None;
     }
     let (mut near, mut far) = near::split(input, &places, &probes, rows, options);
     let surface_probes = probes.len();
-    probes.extend(free::probes(input, bounds, &probes));
+    if pass == Pass::Final {
+        probes.extend(free::probes(input, bounds, &probes));
+    }
     let free: Vec<Vec3> = probes[surface_probes..].iter().map(|probe| probe.position).collect();
     far.extend(free_rows::free_rows(input, &free, options.rays));
     near.resize(far.len(), Vec::new());

@@ -9,7 +9,6 @@ use vlm_format::Grid;
 use vlm_shaders::cpu::gather::Receiver;
 use vlm_shaders::cpu::gather_static::Frame;
 use vlm_shaders::cpu::grid::{blend, leaf_at};
-use vlm_shaders::cpu::inject::{reflect, source_radiosity, uncovered_radiosity};
 use vlm_shaders::cpu::punctual::PunctualLight;
 use vlm_shaders::cpu::refresh::{far_sources, refresh};
 use vlm_shaders::cpu::resolve::luminance;
@@ -92,10 +91,7 @@ fn add_errors(
     rows: &[Row],
     squared: &mut [f32],
 ) {
-    let irradiance = |position, normal| input.trace.irradiance_by(lights, position, normal, normal);
-    let reflected = reflect(input.lights, irradiance);
-    let uncovered = uncovered_radiosity(grid, irradiance);
-    let radiosity = source_radiosity(grid, input.lights, &reflected, &uncovered);
+    let radiosity = white_radiosity(input, lights);
     let arrived = refresh(grid, input.lights, &far_sources(grid, input.lights), &radiosity);
     let frame = Frame { grid, lights: input.lights, arrived: &arrived };
     let shines: Vec<f32> = radiosity.iter().map(|&r| luminance(r)).collect();
@@ -116,6 +112,22 @@ fn add_errors(
             *squared += error / (mean * mean);
         }
     }
+}
+
+/// The radiosity of the sources if all surface were white and nothing shone by itself: where probes lie must not change with colours.
+fn white_radiosity(input: &GridInput, lights: &[PunctualLight]) -> Vec<Vec3> {
+    let irradiance = |position, normal| input.trace.irradiance_by(lights, position, normal, normal);
+    let samples = input.lights.samples.par_iter().map(|s| irradiance(s.position, s.normal));
+    let mut radiosity: Vec<Vec3> = samples.collect();
+    let of_lights: Vec<Vec3> = (0..input.lights.len())
+        .map(|light| {
+            let own = input.lights.sample_range(light).unwrap_or_default();
+            own.map(|sample| radiosity[sample] * input.shares[sample]).sum()
+        })
+        .collect();
+    radiosity.extend(of_lights);
+    radiosity.par_extend(input.uncovered.par_iter().map(|piece| irradiance(piece.position, piece.normal)));
+    radiosity
 }
 
 fn receiver(place: &Place) -> Receiver {

@@ -109,10 +109,17 @@ fn tint_and_intensity_change_the_light_and_nothing_else() {
         assert!(b.abs_diff_eq(a * factor, 1e-5), "{a} {b}");
     }
     assert!(plain.emission.iter().any(|&e| e != Vec3::ZERO));
+    let pieces = |asset: &VlmAsset| asset.grid.as_ref().map_or_else(Vec::new, |grid| grid.uncovered.clone());
+    for (a, b) in pieces(&plain).iter().zip(pieces(&colored)) {
+        assert!(b.reflectance.abs_diff_eq(a.reflectance * factor, 1e-6) && b.position == a.position);
+    }
     let geometry = |asset: &VlmAsset| {
         let samples: Vec<_> = asset.samples.iter().map(|s| (s.position, s.normal)).collect();
-        let VlmAsset { vlms, positions, triangles, tags, sample_starts, primitive_tags, grid, .. } =
+        let VlmAsset { vlms, positions, triangles, tags, sample_starts, primitive_tags, mut grid, .. } =
             asset.clone();
+        for piece in grid.iter_mut().flat_map(|grid| &mut grid.uncovered) {
+            (piece.reflectance, piece.emission) = (Vec3::ZERO, Vec3::ZERO);
+        }
         (vlms, positions, triangles, tags, sample_starts, primitive_tags, grid, samples)
     };
     assert!(geometry(&plain) == geometry(&colored), "only colours differ");
