@@ -17,6 +17,7 @@ use vlm_bake::progress::Silent;
 use vlm_bake::render::{LitScene, RenderError, gather_by_grid};
 use vlm_bake::scene::{Camera, Scene};
 use vlm_bake::shade::TraceScene;
+use vlm_format::Grid;
 use vlm_shaders::cpu::resolve::luminance;
 
 use crate::method::View;
@@ -161,8 +162,8 @@ fn traced_by_lights(
     spp: u32,
 ) -> Result<Vec<Vec3>, RenderError> {
     let lit = LitScene::new(trace, &baked.asset)?;
-    let grid = baked.asset.grid.clone().unwrap_or_default();
-    let radiosity = lit.source_radiosity(&grid);
+    let no_grid = Grid::default();
+    let radiosity = lit.source_radiosity(trace, baked.asset.grid.as_ref().unwrap_or(&no_grid));
     let at = |(pixel, point): (usize, &Option<vlm_bake::shade::SurfacePoint>)| {
         point.as_ref().map_or(Vec3::ZERO, |point| {
             let row = vlm_bake::grid::transport(trace, &baked.stand_ins, point, spp, pixel as u64);

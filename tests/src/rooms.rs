@@ -49,11 +49,7 @@ pub fn slab(low: Vec3, high: Vec3) -> Mesh {
     for (corner, u, v) in
         [(low, x, z), (low + y, z, x), (low, y, x), (low + z, x, y), (low, z, y), (low + x, y, z)]
     {
-        let side = quad(corner, u, v, 1);
-        let first = all.positions.len() as u32;
-        all.triangles.extend(side.triangles.iter().map(|t| t.map(|i| i + first)));
-        all.positions.extend(side.positions);
-        all.normals.extend(side.normals);
+        all.append(quad(corner, u, v, 1));
     }
     all
 }
@@ -120,7 +116,7 @@ pub fn irradiance(
     let brute = |r: &Receiver| gather(&lit.lights, &lit.radiosity, all.clone(), r).irradiance;
     let brute = receivers.par_iter().map(brute).collect();
     let Some(grid) = asset.grid.as_ref() else { return Ok(Irradiance { brute, ..Irradiance::default() }) };
-    let arrived = lit.arrived(grid);
+    let arrived = lit.arrived(&trace, grid);
     let frame = Frame { grid, lights: &lit.lights, arrived: &arrived };
     Ok(Irradiance {
         grid: receivers.par_iter().map(|r| frame.gather(r).irradiance).collect(),

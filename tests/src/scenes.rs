@@ -21,6 +21,16 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
+impl Mesh {
+    /// Adds the triangles of another mesh.
+    pub fn append(&mut self, other: Self) {
+        let first = self.positions.len() as u32;
+        self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i + first)));
+        self.positions.extend(other.positions);
+        self.normals.extend(other.normals);
+    }
+}
+
 /// A parallelogram of `cells * cells` quads that spans `u` and `v` from `corner`; it faces `u x v`.
 #[must_use]
 pub fn quad(corner: Vec3, u: Vec3, v: Vec3, cells: u32) -> Mesh {

@@ -97,7 +97,7 @@ fn inject_in_cornell() {
         let direct = direct(&lit.lights, grid, irradiance);
         let uploaded = passes.upload(grid, &lit.lights);
         let found = passes.inject(&uploaded, &direct).unwrap();
-        let expected = lit.source_radiosity(grid);
+        let expected = lit.source_radiosity(trace, grid);
         let errors = [error(&found.lights, &lit.radiosity), error(&found.sources, &expected)];
         println!("inject: {errors:?} of {} sources", expected.len());
         assert!(errors.iter().all(|e| *e < INJECT_BOUND), "{errors:?}");
@@ -116,7 +116,8 @@ fn inject_with_emission_and_uncovered_surface() {
     grid.uncovered[0].emission = Vec3::new(4.0, 5.0, 6.0);
     let irradiance = |x: Vec3, n: Vec3| Vec3::new(1.0, 2.0, 3.0) + x + n;
     let reflected = reflect(&lights, irradiance);
-    let expected = source_radiosity(&grid, &lights, &reflected, &uncovered_radiosity(&grid, irradiance));
+    let expected =
+        source_radiosity(&grid, &lights, &reflected, &uncovered_radiosity(&grid.uncovered, irradiance));
     let passes = passes();
     let uploaded = passes.upload(&grid, &lights);
     let found = passes.inject(&uploaded, &direct(&lights, &grid, irradiance)).unwrap();
@@ -141,10 +142,10 @@ fn arrived_errors(found: &Arrived, expected: &Arrived) -> [f32; 3] {
 #[test]
 #[cfg_attr(not(has_vulkan), ignore = "no Vulkan driver")]
 fn refresh_in_cornell() {
-    in_cornell(|_, lit, grid, _| {
+    in_cornell(|trace, lit, grid, _| {
         let passes = passes();
-        let radiosity = lit.source_radiosity(grid);
-        let expected = refresh(grid, &lit.lights, &far_sources(grid, &lit.lights), &radiosity);
+        let radiosity = lit.source_radiosity(trace, grid);
+        let expected = refresh(grid, &lit.lights, &far_sources(&lit.lights, &grid.uncovered), &radiosity);
         let uploaded = passes.upload(grid, &lit.lights);
         let errors = arrived_errors(&passes.refresh(&uploaded, &radiosity).unwrap(), &expected);
         println!("refresh: {errors:?} of {} probes, {} near", grid.probes.len(), grid.near.len());
@@ -208,7 +209,7 @@ fn a_whole_frame_in_cornell() {
             let gathered = passes.gather(&uploaded, arrived, receivers).unwrap();
             gathered.iter().map(|g| (g.irradiance, g.pairs)).collect()
         };
-        let mirrored = lit.arrived(grid);
+        let mirrored = lit.arrived(trace, grid);
         let frame = Frame { grid, lights: &lit.lights, arrived: &mirrored };
         let expected: Vec<_> = receivers.iter().map(|r| frame.gather(r)).collect();
         let expected: Vec<(Vec3, u64)> = expected.iter().map(|g| (g.irradiance, g.pairs)).collect();
@@ -289,7 +290,7 @@ fn leaves_at_the_edges() {
         assert!((weights.weights[0] - weight).abs() < BLEND_BOUND, "{name}: {weights:?}");
     }
     // No light where there is no leaf, not even NaN; some where there is.
-    let arrived = refresh(&grid, &lights, &far_sources(&grid, &lights), &[Vec3::ONE; 9]);
+    let arrived = refresh(&grid, &lights, &far_sources(&lights, &grid.uncovered), &[Vec3::ONE; 9]);
     let gathered = passes.gather(&passes.upload(&grid, &lights), &arrived, &receivers).unwrap();
     for ((name, _, expected), gathered) in cases.iter().zip(gathered) {
         assert_eq!(gathered.irradiance.element_sum() > 0.0, expected.is_some(), "{name}: {gathered:?}");

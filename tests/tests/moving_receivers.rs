@@ -88,7 +88,7 @@ fn of_nearest_probe(scene: &Scene, asset: &VlmAsset, receivers: &[Receiver]) -> 
     let trace = TraceScene::new(scene);
     let lit = LitScene::new(&trace, asset).unwrap();
     let grid = asset.grid.as_ref().unwrap();
-    let arrived = lit.arrived(grid);
+    let arrived = lit.arrived(&trace, grid);
     let probes = &grid.probes[grid.surface_probes as usize..];
     let nearest = |r: &Receiver| {
         let away = |i: &usize| probes[*i].position.distance(r.position);

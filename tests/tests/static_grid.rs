@@ -13,7 +13,7 @@ use vlm_shaders::cpu::gather::Receiver;
 use vlm_shaders::cpu::gather_static::Frame;
 use vlm_shaders::cpu::grid::leaf_at;
 use vlm_tests::rooms::across;
-use vlm_tests::scenes::{Mesh, add, matte, point_light, quad};
+use vlm_tests::scenes::{add, matte, point_light, quad};
 
 fn baked(scene: &Scene, lights: u32) -> VlmAsset {
     vlm_tests::rooms::baked(scene, lights).unwrap()
@@ -37,12 +37,8 @@ fn made_light(plate: bool) -> Scene {
     add(&mut scene, &floor, matte(Vec3::splat(0.5)));
     if plate {
         let half = Vec3::new(-1.0, 0.5, -4.0);
-        let mut both: Mesh = quad(half, 2.0 * Vec3::X, 8.0 * Vec3::Z, 1);
-        let up = quad(half, 8.0 * Vec3::Z, 2.0 * Vec3::X, 1);
-        let first = both.positions.len() as u32;
-        both.triangles.extend(up.triangles.iter().map(|t| t.map(|i| i + first)));
-        both.positions.extend(up.positions);
-        both.normals.extend(up.normals);
+        let mut both = quad(half, 2.0 * Vec3::X, 8.0 * Vec3::Z, 1);
+        both.append(quad(half, 8.0 * Vec3::Z, 2.0 * Vec3::X, 1));
         add(&mut scene, &both, matte(Vec3::splat(0.5)));
     }
     let corners = [Vec3::new(-0.3, 1.0, -0.3), Vec3::new(0.3, 1.0, -0.3), Vec3::new(0.0, 1.0, 0.4)];
@@ -103,7 +99,7 @@ fn one_receiver_gets_what_many_together_get() {
     let trace = TraceScene::new(&scene);
     let lit = LitScene::new(&trace, &asset).unwrap();
     let grid = asset.grid.as_ref().unwrap();
-    let arrived = lit.arrived(grid);
+    let arrived = lit.arrived(&trace, grid);
     let frame = Frame { grid, lights: &lit.lights, arrived: &arrived };
     let view = vlm_bake::gbuffer::GBuffer::trace(&trace, &scene.cameras[0], 48, 48);
     let (mut pairs, mut compared) = (0, 0);

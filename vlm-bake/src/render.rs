@@ -220,7 +220,7 @@ pub fn gather_by_grid(
         return gather_brute(trace, asset, gbuffer, progress);
     };
     let lit = LitScene::new(trace, asset)?;
-    Ok(lit.gather_static(grid, gbuffer, progress))
+    Ok(lit.gather_static(trace, grid, gbuffer, progress))
 }
 
 /// The virtual lights of an asset after phase 1: what every gathering method starts from.
@@ -229,8 +229,6 @@ pub struct LitScene {
     pub lights: LightSet,
     /// What each sample adds to its light's radiosity, lx.
     pub reflected: Vec<Vec3>,
-    /// Radiosity of surface for which no light stands, lx.
-    pub uncovered: Vec<Vec3>,
     /// Phase 1's result: radiosity of each light, lx.
     pub radiosity: Vec<Vec3>,
     /// Wall time of phase 1.
@@ -247,26 +245,28 @@ impl LitScene {
     pub fn new(trace: &TraceScene<'_>, asset: &VlmAsset) -> Result<Self, RenderError> {
         let lights = world_lights(trace.scene, asset)?;
         let start = Instant::now();
-        let irradiance = |position, normal| trace.direct_irradiance(position, normal, normal);
-        let reflected = reflect(&lights, irradiance);
+        let reflected =
+            reflect(&lights, |position, normal| trace.direct_irradiance(position, normal, normal));
         let radiosity = radiosity(&lights, &reflected);
-        let uncovered =
-            asset.grid.as_ref().map_or_else(Vec::new, |grid| uncovered_radiosity(grid, irradiance));
         let inject_seconds = start.elapsed().as_secs_f64();
         let triangle_tags = triangle_tags(trace.scene, asset);
-        Ok(Self { lights, reflected, uncovered, radiosity, inject_seconds, triangle_tags })
+        Ok(Self { lights, reflected, radiosity, inject_seconds, triangle_tags })
     }
 
-    /// The radiosity of the sources of a grid, which must be the asset's own.
+    /// The radiosity of the sources of the asset's grid. Lights its surface without lights, which no other method needs.
     #[must_use]
-    pub fn source_radiosity(&self, grid: &Grid) -> Vec<Vec3> {
-        source_radiosity(grid, &self.lights, &self.reflected, &self.uncovered)
+    pub fn source_radiosity(&self, trace: &TraceScene<'_>, grid: &Grid) -> Vec<Vec3> {
+        let uncovered = uncovered_radiosity(&grid.uncovered, |position, normal| {
+            trace.direct_irradiance(position, normal, normal)
+        });
+        source_radiosity(grid, &self.lights, &self.reflected, &uncovered)
     }
 
-    /// What arrives at the probes of a grid, which must be the asset's own.
+    /// What arrives at the probes of the asset's grid.
     #[must_use]
-    pub fn arrived(&self, grid: &Grid) -> Arrived {
-        refresh(grid, &self.lights, &far_sources(grid, &self.lights), &self.source_radiosity(grid))
+    pub fn arrived(&self, trace: &TraceScene<'_>, grid: &Grid) -> Arrived {
+        let sources = far_sources(&self.lights, &grid.uncovered);
+        refresh(grid, &self.lights, &sources, &self.source_radiosity(trace, grid))
     }
 
     /// Phase 2 at every pixel by `gather`: indirect irradiance in lx, and what it took.
@@ -299,15 +299,17 @@ impl LitScene {
         self.gather_grouped(gbuffer, progress, |_| Some(0), gather, Instant::now())
     }
 
-    /// Phase 2 at every pixel by the static grid: far light is refreshed, then pixels of a leaf are gathered together.
+    /// Phase 2 at every pixel by the static grid: its probes are refreshed, then pixels of a leaf are gathered together. The time of
+    /// [`LitScene::source_radiosity`] counts with it.
     pub fn gather_static(
         &self,
+        trace: &TraceScene<'_>,
         grid: &Grid,
         gbuffer: &GBuffer,
         progress: &dyn Progress,
     ) -> (Vec<Vec3>, RenderStats) {
         let start = Instant::now();
-        let arrived = self.arrived(grid);
+        let arrived = self.arrived(trace, grid);
         let frame = Frame { grid, lights: &self.lights, arrived: &arrived };
         let gather = |leaf, receivers: &[Receiver]| frame.gather_together(leaf, receivers);
         self.gather_grouped(gbuffer, progress, |position| leaf_at(grid, position), gather, start)
@@ -354,12 +356,7 @@ impl LitScene {
     /// A surface point as phase 2 sees it.
     #[must_use]
     pub fn receiver(&self, point: &SurfacePoint) -> Receiver {
-        Receiver {
-            position: point.position,
-            normal: point.normal,
-            geometric_normal: point.geometric_normal,
-            tag: self.tag(point.triangle),
-        }
+        point.receiver(self.tag(point.triangle))
     }
 
     fn tag(&self, triangle: u32) -> u32 {

@@ -1,6 +1,7 @@
 //! A scene ready for rays: what they meet, what colour it has there, and the direct light on it.
 
 use glam::Vec3;
+use vlm_shaders::cpu::gather::Receiver;
 use vlm_shaders::cpu::punctual;
 
 use crate::bvh::{Bvh, Hit};
@@ -51,6 +52,15 @@ pub struct SurfacePoint {
     pub albedo: Vec3,
     /// Emitted radiance, nt.
     pub emission: Vec3,
+}
+
+impl SurfacePoint {
+    /// The point as phase 2 sees it, on surface of this tag.
+    #[must_use]
+    pub fn receiver(&self, tag: u32) -> Receiver {
+        let &Self { position, normal, geometric_normal, .. } = self;
+        Receiver { position, normal, geometric_normal, tag }
+    }
 }
 
 impl<'a> TraceScene<'a> {

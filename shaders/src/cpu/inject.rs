@@ -33,10 +33,13 @@ pub fn radiosity(lights: &LightSet, reflected: &[Vec3]) -> Vec<Vec3> {
 
 /// The radiosity of each piece of surface for which no light stands, lx; `irradiance` as in [`inject`].
 #[must_use]
-pub fn uncovered_radiosity(grid: &Grid, irradiance: impl Fn(Vec3, Vec3) -> Vec3 + Sync) -> Vec<Vec3> {
+pub fn uncovered_radiosity(
+    uncovered: &[Uncovered],
+    irradiance: impl Fn(Vec3, Vec3) -> Vec3 + Sync,
+) -> Vec<Vec3> {
     let radiosity =
         |piece: &Uncovered| piece.reflectance * irradiance(piece.position, piece.normal) + piece.emission;
-    grid.uncovered.par_iter().map(radiosity).collect()
+    uncovered.par_iter().map(radiosity).collect()
 }
 
 /// The radiosity of the grid's sources, lx: of the surface around each sample, of the surface of each light, and of surface for which

@@ -28,7 +28,7 @@ pub struct FarSource {
 
 /// All sources of a grid: of the samples, then of the lights, then of surface for which none stands.
 #[must_use]
-pub fn far_sources(grid: &Grid, lights: &LightSet) -> Vec<FarSource> {
+pub fn far_sources(lights: &LightSet, uncovered: &[Uncovered]) -> Vec<FarSource> {
     let of_sample = |s: &Sample| FarSource { centroid: s.position, normal: s.normal, ..FarSource::default() };
     let of_light = |light: &LightGeometry| FarSource {
         centroid: light.centroid(),
@@ -41,7 +41,7 @@ pub fn far_sources(grid: &Grid, lights: &LightSet) -> Vec<FarSource> {
         ..FarSource::default()
     };
     let of_lights = lights.geometry.iter().map(of_light);
-    let of_pieces = grid.uncovered.iter().map(of_piece);
+    let of_pieces = uncovered.iter().map(of_piece);
     lights.samples.iter().map(of_sample).chain(of_lights).chain(of_pieces).collect()
 }
 

@@ -129,7 +129,7 @@ impl GridPasses {
             &scene.probes,
             &gpu.input("rows", bytemuck::cast_slice(&grid.rows)),
             &gpu.input("near_form_factors", bytemuck::cast_slice(&grid.near_form_factors)),
-            &gpu.input("sources", bytemuck::cast_slice(&far_sources(grid, lights))),
+            &gpu.input("sources", bytemuck::cast_slice(&far_sources(lights, &grid.uncovered))),
             &self.vectors("radiosity", radiosity),
             &far,
             &near,

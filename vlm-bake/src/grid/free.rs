@@ -9,14 +9,14 @@ use rustc_hash::FxHashMap;
 use vlm_format::Probe;
 use vlm_shaders::cpu::grid::leaf_at;
 
-use super::{GridInput, cells_between, free_reach, tree};
+use super::{GridInput, cells_between, free_reach, spacing, tree};
 use crate::reference::directions_around;
 use crate::scene::Scene;
 use crate::shade::TraceScene;
 use crate::topology::area;
 
 /// Probes are never closer than this share of the scene's extent: half of the widest spacing on surface.
-const NARROWEST: f64 = 1.0 / 32.0;
+const NARROWEST: f64 = 0.5 * spacing::WIDEST as f64;
 
 /// Nor closer than this many times the edge of the surface around a sample: light is not known more finely.
 const OF_SAMPLE: f64 = 1.4;

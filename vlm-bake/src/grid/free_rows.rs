@@ -5,7 +5,6 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
-use vlm_format::Grid;
 use vlm_shaders::cpu::free_light::{COEFFICIENTS, FreeLight, harmonics};
 use vlm_shaders::cpu::refresh::{FarSource, far_sources};
 
@@ -29,8 +28,7 @@ pub fn free_rows(input: &GridInput, places: &[Vec3], rays: u32) -> Vec<Row> {
         return Vec::new();
     }
     let made = made_lights::made_lights(input);
-    let of_uncovered = Grid { uncovered: input.uncovered.to_vec(), ..Grid::default() };
-    let sources = far_sources(&of_uncovered, input.lights);
+    let sources = far_sources(input.lights, input.uncovered);
     let row = |(i, &place): (usize, &Vec3)| {
         let mut wanted = Moments::default();
         let met = directions_around(rays, i as u64);

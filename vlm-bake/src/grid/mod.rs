@@ -3,12 +3,13 @@
 //! **Probes** lie on the exposed surface, denser where light changes over short distances. From each, rays over the
 //! hemisphere find what share of its light comes from which surface, and so from which light: occlusion is known
 //! at the probe, whatever the lights will shine. Lights so near that a probe's light varies over its reach become *near*: the frame
-//! evaluates their form factor at each pixel, times the share of it that the probes see. All others are *far*: the frame sums them once per
-//! probe, and pixels blend their probes.
+//! evaluates their form factor at each pixel, times the radiosity that the probes see of them. All others are *far*: the frame sums them once
+//! per probe, and pixels blend their probes.
 //!
 //! Receivers that move find **free** probes in the volumes that artists mark, with light from all sides.
 //!
-//! Steps: `stand_in -> pool -> spacing -> reach -> transport, made_lights -> near -> free -> tree`.
+//! Steps: `uncovered -> stand_in -> pool`, then for a rough grid, from which `refine` learns, and for the final one
+//! `spacing -> reach -> transport, made_lights -> near -> free -> tree`.
 
 mod free;
 mod free_reach;

@@ -6,7 +6,6 @@
 use glam::Vec3;
 use rayon::prelude::*;
 use vlm_format::Grid;
-use vlm_shaders::cpu::gather::Receiver;
 use vlm_shaders::cpu::gather_static::Frame;
 use vlm_shaders::cpu::grid::{blend, leaf_at};
 use vlm_shaders::cpu::punctual::PunctualLight;
@@ -92,25 +91,35 @@ fn add_errors(
     squared: &mut [f32],
 ) {
     let radiosity = white_radiosity(input, lights);
-    let arrived = refresh(grid, input.lights, &far_sources(grid, input.lights), &radiosity);
+    let exact: Vec<Sampled> = rows.par_iter().map(|row| Sampled::new(row, &radiosity)).collect();
+    let mean = exact.iter().map(|e| e.irradiance).sum::<f32>() / exact.len().max(1) as f32;
+    if mean <= 0.0 {
+        return;
+    }
+    let arrived = refresh(grid, input.lights, &far_sources(input.lights, input.uncovered), &radiosity);
     let frame = Frame { grid, lights: input.lights, arrived: &arrived };
-    let shines: Vec<f32> = radiosity.iter().map(|&r| luminance(r)).collect();
-    let compare = |(place, row): (&Place, &Row)| {
-        let (mut exact, mut noise) = (0.0, 0.0);
+    squared.par_iter_mut().zip(places).zip(&exact).for_each(|((squared, place), exact)| {
+        let error = luminance(frame.gather(&place.surface.receiver(0)).irradiance) - exact.irradiance;
+        *squared += (error * error - exact.variance).max(0.0) / (mean * mean);
+    });
+}
+
+/// What the rays of a place find.
+struct Sampled {
+    irradiance: f32,
+    /// Of the irradiance, at most: rays are stratified.
+    variance: f32,
+}
+
+impl Sampled {
+    fn new(row: &Row, radiosity: &[Vec3]) -> Self {
+        let mut sampled = Self { irradiance: 0.0, variance: 0.0 };
         for &(source, share) in row {
-            let light = shines[source as usize];
-            exact += share * light;
-            noise += share * light * light / RAYS as f32;
+            let light = luminance(radiosity[source as usize]);
+            sampled.irradiance += share * light;
+            sampled.variance += share * light * light / RAYS as f32;
         }
-        let error = luminance(frame.gather(&receiver(place)).irradiance) - exact;
-        (exact, (error * error - noise).max(0.0))
-    };
-    let compared: Vec<(f32, f32)> = places.par_iter().zip(rows).map(compare).collect();
-    let mean = compared.iter().map(|(exact, _)| exact).sum::<f32>() / places.len().max(1) as f32;
-    if mean > 0.0 {
-        for (squared, (_, error)) in squared.iter_mut().zip(compared) {
-            *squared += error / (mean * mean);
-        }
+        sampled
     }
 }
 
@@ -130,19 +139,9 @@ fn white_radiosity(input: &GridInput, lights: &[PunctualLight]) -> Vec<Vec3> {
     radiosity
 }
 
-fn receiver(place: &Place) -> Receiver {
-    let surface = &place.surface;
-    Receiver {
-        position: surface.position,
-        normal: surface.normal,
-        geometric_normal: surface.geometric_normal,
-        tag: 0,
-    }
-}
-
 /// The probes that serve a place, with their weights.
 fn serving<'g>(grid: &'g Grid, place: &Place) -> impl Iterator<Item = (usize, f32)> + 'g {
-    let receiver = receiver(place);
+    let receiver = place.surface.receiver(0);
     let blend = leaf_at(grid, receiver.position).map(|leaf| blend(grid, leaf, &receiver)).unwrap_or_default();
     (0..blend.count as usize)
         .map(move |i| (grid.leaf_probes[blend.first as usize + i] as usize, blend.weights[i]))

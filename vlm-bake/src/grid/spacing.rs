@@ -7,7 +7,7 @@ use super::cells_between;
 use super::pool::Place;
 
 /// Probes are at most this share of the scene's extent apart.
-const WIDEST: f32 = 1.0 / 16.0;
+pub(super) const WIDEST: f32 = 1.0 / 16.0;
 
 /// The narrowest spacing over the widest. Lower values follow contact shadows into smaller corners, where few pixels see
 /// them.

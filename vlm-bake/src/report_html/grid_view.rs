@@ -3,7 +3,6 @@
 use glam::Vec3;
 use image::{Rgb, RgbImage};
 use vlm_format::{Grid, Probe};
-use vlm_shaders::cpu::gather::Receiver;
 use vlm_shaders::cpu::grid::{blend, leaf_at};
 
 use super::colour::ramp;
@@ -66,13 +65,7 @@ fn reach_m(probe: &Probe) -> f64 {
 pub fn near_lights_at(grid: &Grid, fact: &Fact) -> Option<usize> {
     let point = &fact.point;
     let leaf = leaf_at(grid, point.position)?;
-    let receiver = Receiver {
-        position: point.position,
-        normal: point.normal,
-        geometric_normal: point.geometric_normal,
-        tag: fact.surface_tag,
-    };
-    let blend = blend(grid, leaf, &receiver);
+    let blend = blend(grid, leaf, &point.receiver(fact.surface_tag));
     let counting = (0..blend.count as usize).filter(|&i| blend.weights[i] > 0.0);
     let probes = counting.filter_map(|i| grid.leaf_probes.get(blend.first as usize + i).copied());
     Some(near_lights(grid, probes))
