@@ -3,7 +3,8 @@
 //! All errors are relative RMSE of indirect irradiance against the path-traced truth, at the pixels that show a surface:
 //! `lights` traces the truth's rays but takes the radiosity of the light that stands where they end: what is left is the resolution of
 //! lights and samples. `grid` is the method itself: interpolation of visibility and far light, and rays of the probes, come on top.
-//! `algorithm` is the distance of `grid` from the exact sum over its own lights with visibility.
+//! `algorithm` is the distance of `grid` from `lights`, relative to the latter: the exact sum over the same sources with visibility. The noise of
+//! its rays, about the truth's, is in it.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -48,6 +49,8 @@ pub struct Row {
     pub lights_error: Option<f64>,
     /// Signed energy likewise.
     pub lights_energy: Option<f64>,
+    /// Distance of the grid from the exact sum over its own sources with visibility.
+    pub algorithm: Option<f64>,
     /// Error of the grid.
     pub error: f64,
     /// Signed energy of the grid.
@@ -114,9 +117,9 @@ pub fn measure(
         let (picture, stats) = gather_by_grid(&trace, &baked.asset, &view.gbuffer, &Silent)?;
         let seconds = start.elapsed().as_secs_f64().min(stats.seconds.gather);
         let hit = view.hit();
-        let compare = |image: &[Vec3]| -> Metrics {
+        let compare = |image: &[Vec3], truth: &[Vec3]| -> Metrics {
             let width = options.size.0 as usize;
-            compare(&Comparison { width, image, truth: &truth.irradiance, hit: &hit }).unwrap_or_default()
+            compare(&Comparison { width, image, truth, hit: &hit }).unwrap_or_default()
         };
         let by_lights = if options.lights_spp > 0 {
             let image = traced_by_lights(&trace, &view, &baked, options.lights_spp)?;
@@ -124,11 +127,11 @@ pub fn measure(
                 let path = folder.join(format!("{name}_{}_lights.png", camera.name));
                 write_error(&path, options.size, &image, &truth.irradiance)?;
             }
-            Some(compare(&image))
+            Some((compare(&image, &truth.irradiance), compare(&picture, &image)))
         } else {
             None
         };
-        let metrics = compare(&picture);
+        let metrics = compare(&picture, &truth.irradiance);
         if let Some(folder) = &options.pictures {
             let path = folder.join(format!("{name}_{}_{}.png", camera.name, bake_options.preset.name()));
             write_error(&path, options.size, &picture, &truth.irradiance)?;
@@ -143,8 +146,9 @@ pub fn measure(
             grid_bytes: grid.bytes,
             grid_seconds: baked.report.seconds.get("grid").copied().unwrap_or(0.0),
             noise: truth.noise,
-            lights_error: by_lights.map(|m| m.relative_rmse),
-            lights_energy: by_lights.map(|m| m.signed_energy),
+            lights_error: by_lights.map(|(lights, _)| lights.relative_rmse),
+            lights_energy: by_lights.map(|(lights, _)| lights.signed_energy),
+            algorithm: by_lights.map(|(_, algorithm)| algorithm.relative_rmse),
             error: metrics.relative_rmse,
             energy: metrics.signed_energy,
             pairs: stats.pairs_evaluated as f64 / metrics.pixels.max(1) as f64,
@@ -191,15 +195,16 @@ fn write_error(
 #[must_use]
 pub fn table(rows: &[Row]) -> String {
     let mut text = String::from(
-        "| scene | camera | preset | lights | probes | grid MB | grid s | noise | lights | grid | energy | pairs | us/pixel |\n\
-         |---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+        "| scene | camera | preset | lights | probes | grid MB | grid s | noise | lights | algorithm | grid | energy | pairs | us/pixel |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for r in rows {
         let lights = r.lights_error.zip(r.lights_energy);
         let lights =
             lights.map_or_else(String::new, |(e, energy)| format!("{e:.3}, {:+.1} %", 100.0 * energy));
+        let algorithm = r.algorithm.map_or_else(String::new, |error| format!("{error:.3}"));
         text += &format!(
-            "| {} | {} | {} | {} | {} | {:.1} | {:.1} | {:.3} | {lights} | {:.3} | {:+.1} % | {:.1} | {:.2} |\n",
+            "| {} | {} | {} | {} | {} | {:.1} | {:.1} | {:.3} | {lights} | {algorithm} | {:.3} | {:+.1} % | {:.1} | {:.2} |\n",
             r.scene,
             r.camera,
             r.preset,
