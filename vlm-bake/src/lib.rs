@@ -54,3 +54,5 @@ pub mod render;
 pub mod picture;
 
 pub mod report_html;
+
+pub mod follow;
