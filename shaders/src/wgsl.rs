@@ -19,6 +19,18 @@ pub const FAR: &str = include_str!("../wgsl/shared/far.wgsl");
 /// [`FAR`].
 pub const GATHER_STATIC: &str = include_str!("../wgsl/shared/gather_static.wgsl");
 
+/// The rows of probes; after [`GRID`].
+const ROWS: &str = include_str!("../wgsl/shared/rows.wgsl");
+
+/// A point that is lit.
+const RECEIVER: &str = include_str!("../wgsl/shared/receiver.wgsl");
+
+/// The light around a probe in free space.
+pub const FREE_LIGHT: &str = include_str!("../wgsl/shared/free_light.wgsl");
+
+/// The function `gather_free` with its bindings, for shaders that light what moves; after [`GATHER_STATIC`] and [`FREE_LIGHT`].
+pub const GATHER_FREE: &str = include_str!("../wgsl/shared/gather_free.wgsl");
+
 /// A compute shader that finds one form factor per case; entry point `main`, 64 invocations per workgroup.
 #[must_use]
 pub fn form_factor_cases() -> String {
@@ -42,24 +54,40 @@ pub fn inject() -> String {
 /// What arrives at the probes; entry point `refresh`, 64 invocations per workgroup, one per probe.
 #[must_use]
 pub fn refresh() -> String {
-    format!("{GRID}\n{BLEND}\n{FAR}\n{}", include_str!("../wgsl/refresh.wgsl"))
+    format!("{GRID}\n{BLEND}\n{FAR}\n{ROWS}\n{}", include_str!("../wgsl/refresh.wgsl"))
+}
+
+/// What arrives at the probes in free space; entry point `refresh_free`, 64 invocations per workgroup, one per such probe.
+#[must_use]
+pub fn refresh_free() -> String {
+    format!("{GRID}\n{BLEND}\n{FREE_LIGHT}\n{ROWS}\n{}", include_str!("../wgsl/refresh_free.wgsl"))
 }
 
 /// Phase 2 by the static grid at a list of receivers; entry point `gather`, 64 invocations per workgroup, one per receiver.
 #[must_use]
 pub fn gather_static() -> String {
     let receivers = include_str!("../wgsl/gather_static.wgsl");
-    format!("{FORM_FACTOR}\n{GRID}\n{BLEND}\n{FAR}\n{GATHER_STATIC}\n{receivers}")
+    format!("{FORM_FACTOR}\n{GRID}\n{BLEND}\n{FAR}\n{GATHER_STATIC}\n{RECEIVER}\n{receivers}")
+}
+
+/// Phase 2 at a list of receivers that move; entry point `gather_moving`, 64 invocations per workgroup, one per receiver.
+#[must_use]
+pub fn gather_free() -> String {
+    let receivers = include_str!("../wgsl/gather_free.wgsl");
+    let gather = format!("{GATHER_STATIC}\n{FREE_LIGHT}\n{GATHER_FREE}");
+    format!("{FORM_FACTOR}\n{GRID}\n{BLEND}\n{FAR}\n{gather}\n{RECEIVER}\n{receivers}")
 }
 
 /// Every shader with its name.
 #[must_use]
-pub fn all() -> [(&'static str, String); 5] {
+pub fn all() -> [(&'static str, String); 7] {
     [
         ("form_factor_cases", form_factor_cases()),
         ("form_factor_sums", form_factor_sums()),
         ("inject", inject()),
         ("refresh", refresh()),
+        ("refresh_free", refresh_free()),
         ("gather_static", gather_static()),
+        ("gather_free", gather_free()),
     ]
 }

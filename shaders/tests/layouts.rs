@@ -5,6 +5,7 @@ use std::mem::{offset_of, size_of};
 use naga::proc::Layouter;
 use vlm_format::{Leaf, Probe, Sample, Uncovered};
 use vlm_shaders::cpu::form_factor::LightGeometry;
+use vlm_shaders::cpu::free_light::FreeLight;
 use vlm_shaders::cpu::gather::Receiver;
 use vlm_shaders::cpu::refresh::{FarLight, FarSource};
 use vlm_shaders::tables::{GridHeader, LightSurface};
@@ -113,6 +114,10 @@ fn the_grid() {
     for source in [wgsl::refresh(), wgsl::gather_static()] {
         assert_eq!(layout(&source, "Probe"), probe);
         assert_eq!(layout(&source, "FarLight"), far);
+    }
+    let free = layout_of!(FreeLight, 1, coefficients);
+    for source in [wgsl::refresh_free(), wgsl::gather_free()] {
+        assert_eq!(layout(&source, "FreeLight"), free);
     }
     let source = layout_of!(FarSource, 1, centroid, padding, normal, padding_2);
     assert_eq!(layout(&wgsl::refresh(), "FarSource"), source);

@@ -1,12 +1,4 @@
-// The static grid's irradiance at a list of receivers; one invocation each. After shared/gather_static.wgsl.
-
-struct Receiver {
-    position: array<f32, 3>,
-    normal: array<f32, 3>,
-    geometric_normal: array<f32, 3>,
-    // Not read: probes know which lights reach them.
-    tag: u32,
-}
+// The static grid's irradiance at a list of receivers; one invocation each. After shared/gather_static.wgsl and shared/receiver.wgsl.
 
 @group(2) @binding(0) var<storage, read> receivers: array<Receiver>;
 @group(2) @binding(1) var<storage, read_write> gathered: array<Gathered>;

@@ -1,28 +1,11 @@
 // What arrives at the probes, from the radiosity of the sources; one invocation per probe. After shared/grid.wgsl,
-// shared/blend.wgsl and shared/far.wgsl; mirror: src/cpu/refresh.rs.
+// shared/blend.wgsl, shared/far.wgsl and shared/rows.wgsl; mirror: src/cpu/refresh.rs.
 //
 // Runs again only where lights changed. Every probe writes its own far light and its own near lights, so invocations share nothing.
 
 const LEAST_COSINE: f32 = 0.2;
 
-struct FarSource {
-    centroid: vec3f,
-    padding: f32,
-    normal: vec3f,
-    padding_2: f32,
-}
-
-struct Row {
-    next: u32,
-    end: u32,
-    source: u32,
-}
-
-@group(1) @binding(1) var<storage, read> rows: array<u32>;
 @group(1) @binding(2) var<storage, read> near_form_factors: array<f32>;
-@group(1) @binding(3) var<storage, read> sources: array<FarSource>;
-// Of the sources, lx; w is not used.
-@group(1) @binding(4) var<storage, read> radiosity: array<vec4f>;
 // One per probe on surface.
 @group(1) @binding(5) var<storage, read_write> far: array<FarLight>;
 // One per element of `near`, lx; w is not used.
@@ -116,25 +99,4 @@ fn normalize_or_zero(v: vec3f) -> vec3f {
 
 fn packed(v: vec3f) -> array<f32, 3> {
     return array(v.x, v.y, v.z);
-}
-
-fn row_of(number: u32) -> Row {
-    let at = header.row_starts + number;
-    return Row(indices[at], indices[at + 1u], 0u);
-}
-
-// The weight of a row's next entry and, in `source`, whose it is; 0 after the last.
-fn next_weight(row: ptr<function, Row>) -> u32 {
-    while (*row).next < (*row).end && (*row).next / 2u < arrayLength(&rows) {
-        let word = rows[(*row).next / 2u];
-        let entry = (word >> (16u * ((*row).next & 1u))) & 0xffffu;
-        (*row).next++;
-        let step = entry & 0xffu;
-        let weight = entry >> 8u;
-        (*row).source += select(step, 256u * step, weight == 0u);
-        if weight > 0u {
-            return weight;
-        }
-    }
-    return 0u;
 }

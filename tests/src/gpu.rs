@@ -64,10 +64,21 @@ impl Gpu {
         number: u32,
         buffers: &[&wgpu::Buffer],
     ) -> wgpu::BindGroup {
-        let entries: Vec<_> = (0..)
-            .zip(buffers)
-            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
-            .collect();
+        let numbered: Vec<_> = (0..).zip(buffers.iter().copied()).collect();
+        self.group_at(pipeline, number, &numbered)
+    }
+
+    /// Buffers as the bindings of these numbers of a group.
+    pub(crate) fn group_at(
+        &self,
+        pipeline: &wgpu::ComputePipeline,
+        number: u32,
+        buffers: &[(u32, &wgpu::Buffer)],
+    ) -> wgpu::BindGroup {
+        let mut entries = Vec::with_capacity(buffers.len());
+        for &(binding, buffer) in buffers {
+            entries.push(wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() });
+        }
         self.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
             layout: &pipeline.get_bind_group_layout(number),

@@ -5,7 +5,7 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use glam::{DMat4, Vec3};
+use glam::{DMat4, DVec3, Vec3, Vec4};
 use vlm_bake::bake::bake;
 use vlm_bake::gbuffer::GBuffer;
 use vlm_bake::options::{BakeOptions, Preset};
@@ -21,6 +21,7 @@ use vlm_shaders::cpu::inject::{radiosity, reflect, source_radiosity, uncovered_r
 use vlm_shaders::cpu::refresh::{Arrived, far_sources, refresh};
 use vlm_shaders::cpu::upload::LightSet;
 use vlm_tests::grid_gpu::GridPasses;
+use vlm_tests::random::{plastic_point, sphere_direction, unit};
 use vlm_tests::sample_asset::{quads, room};
 
 /// Rounding of sums in another order and of fused multiplications, over the largest value.
@@ -33,6 +34,8 @@ const BLEND_BOUND: f32 = 1e-5;
 const GATHER_BOUND: f32 = 1e-4;
 /// The share of pixels that may fall into another leaf, or see a light on the other side of the horizon.
 const GATHER_OUTLIERS: f32 = 0.001;
+/// Likewise of points in space, which lie on no surface, so that a leaf's border cuts more of them off.
+const MOVING_OUTLIERS: f32 = 0.01;
 /// Over the frame's mean, of every pixel.
 const GATHER_WORST: f32 = 1e-2;
 
@@ -41,9 +44,13 @@ struct Baked {
     asset: VlmAsset,
 }
 
-static CORNELL: LazyLock<Baked> = LazyLock::new(|| {
+fn cornell_scene() -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/cornell.glb");
-    let scene = load(&GltfFile::open(&path).unwrap(), &LoadOptions::default()).unwrap();
+    load(&GltfFile::open(&path).unwrap(), &LoadOptions::default()).unwrap()
+}
+
+static CORNELL: LazyLock<Baked> = LazyLock::new(|| {
+    let scene = cornell_scene();
     let options = BakeOptions::preset(Preset::Game, scene.triangles.len());
     let asset = bake(&scene, &options, &Silent).unwrap().asset;
     Baked { scene, asset }
@@ -234,6 +241,67 @@ fn a_whole_frame_in_cornell() {
         far.far.iter_mut().for_each(|far| far.by_normal[1] *= 1.01);
         assert!(within(&frame_errors(&on_device(&far), &expected).0) > GATHER_BOUND, "the check can fail");
     });
+}
+
+/// Points of an object that moves through the box and out of it.
+fn moving(receivers: &[Receiver], low: Vec3, high: Vec3) -> Vec<Receiver> {
+    let size = high - low;
+    let moved = |(i, receiver): (usize, &Receiver)| {
+        let normal = sphere_direction(plastic_point(i as u32, (0.3, 0.7)));
+        let at = Vec3::from([0, 1, 2].map(|axis| unit(axis, i as u64)));
+        let position = low - 0.2 * size + 1.4 * size * at;
+        Receiver { position, normal, geometric_normal: normal, ..*receiver }
+    };
+    receivers.iter().enumerate().map(moved).collect()
+}
+
+/// The lower half of the box is a volume, so that other leaves hold surface alone.
+#[test]
+#[cfg_attr(not(has_vulkan), ignore = "no Vulkan driver")]
+fn what_moves_in_cornell_and_around_it() {
+    let mut scene = cornell_scene();
+    let [low, high] = scene.bounds().unwrap();
+    scene.volumes = vec![[low, DVec3::new(high.x, 0.5 * (low.y + high.y), high.z)]];
+    let asset =
+        bake(&scene, &BakeOptions::preset(Preset::Game, scene.triangles.len()), &Silent).unwrap().asset;
+    let trace = TraceScene::new(&scene);
+    let lit = LitScene::new(&trace, &asset).unwrap();
+    let grid = asset.grid.as_ref().unwrap();
+    let passes = passes();
+    let uploaded = passes.upload(grid, &lit.lights);
+
+    let mirrored = lit.arrived(&trace, grid);
+    let arrived = passes.refresh(&uploaded, &lit.source_radiosity(&trace, grid)).unwrap();
+    let coefficients = |a: &Arrived| -> Vec<Vec3> {
+        a.free.iter().flat_map(|free| free.coefficients).map(Vec4::truncate).collect()
+    };
+    let refreshed = error(&coefficients(&arrived), &coefficients(&mirrored));
+    assert!(mirrored.free.len() > 20 && refreshed < REFRESH_BOUND, "{refreshed} of {}", mirrored.free.len());
+    let disturbed = disturbed(&coefficients(&arrived));
+    assert!(error(&disturbed, &coefficients(&mirrored)) > REFRESH_BOUND, "the check can fail");
+
+    let still = [Receiver { position: Vec3::ZERO, normal: Vec3::Y, geometric_normal: Vec3::Y, tag: 0 }; 4000];
+    let receivers = moving(&still, low.as_vec3(), high.as_vec3());
+    let frame = Frame { grid, lights: &lit.lights, arrived: &mirrored };
+    let expected: Vec<_> =
+        receivers.iter().map(|r| frame.gather_free(r)).map(|g| (g.irradiance, g.pairs)).collect();
+    let on_device = |arrived: &Arrived| -> Vec<(Vec3, u64)> {
+        let gathered = passes.gather_free(&uploaded, arrived, &receivers).unwrap();
+        gathered.iter().map(|g| (g.irradiance, g.pairs)).collect()
+    };
+    let by_surface = expected.iter().filter(|(_, pairs)| *pairs > 0).count();
+    assert!(by_surface > 100 && by_surface < 3000, "both kinds of leaves are asked: {by_surface}");
+    let within = |errors: &[f32]| errors[((1.0 - MOVING_OUTLIERS) * errors.len() as f32) as usize];
+    let (errors, _) = frame_errors(&on_device(&arrived), &expected);
+    println!("moving: {} of 99 %, {} of all", within(&errors), errors[errors.len() - 1]);
+    assert!(within(&errors) < GATHER_BOUND, "{}", within(&errors));
+    // The negative controls: light in free space, or that of surface, that is a hundredth brighter.
+    let mut brighter = arrived.clone();
+    brighter.free.iter_mut().flat_map(|free| &mut free.coefficients).for_each(|c| *c *= 1.01);
+    assert!(within(&frame_errors(&on_device(&brighter), &expected).0) > GATHER_BOUND, "the check can fail");
+    let near = arrived.near.iter().map(|b| b * 1.01).collect();
+    let (errors, _) = frame_errors(&on_device(&Arrived { near, ..arrived.clone() }), &expected);
+    assert!(within(&errors) > GATHER_BOUND, "the check can fail");
 }
 
 /// Four lights over a grid of 2 x 3 x 4 cells of half a metre, one of them divided. Sizes are powers of two, so that quotients are exact

@@ -10,13 +10,13 @@ use super::grid::leaf_at;
 
 /// Probes that do not reach a point count where none holds it deeper than this ([`vlm_format::Probe::depth`]). Higher values leak more
 /// close to walls, lower ones make the ends of reaches sharper.
-const FIRM: f32 = 0.01;
+const FIRM_DEPTH: f32 = 0.01;
 
 /// Weights that sum to less are lost to rounding.
 const LEAST_SUM: f32 = 1e-30;
 
 /// Probes on surface are asked for normals up to about this cosine from their own. Lower values ask them for more than they know.
-const LEAST_COSINE: f32 = 0.8;
+const LEAST_BENT_COSINE: f32 = 0.8;
 
 /// How many coarsest cells away light is looked for from a point of an empty cell. Higher values find light farther off, and take six
 /// look-ups each.
@@ -49,7 +49,7 @@ impl Frame<'_> {
                 (nearest, most) = (probe.normal, weight);
             }
         }
-        let missing = (LEAST_COSINE - receiver.normal.dot(nearest)).max(0.0);
+        let missing = (LEAST_BENT_COSINE - receiver.normal.dot(nearest)).max(0.0);
         let bent = receiver.normal + nearest * (2.0 * missing);
         let normal = bent.try_normalize().unwrap_or(nearest);
         Receiver { normal, geometric_normal: normal, ..*receiver }
@@ -76,7 +76,7 @@ impl Frame<'_> {
         }
         // Where reaches end, strays fade in.
         let reached = sum > LEAST_SUM;
-        let stray_share = if reached { (1.0 - depth / FIRM).max(0.0) } else { 1.0 };
+        let stray_share = if reached { (1.0 - depth / FIRM_DEPTH).max(0.0) } else { 1.0 };
         let stray_share = stray_share * stray_share;
         let inside = if reached { inside * ((1.0 - stray_share) / sum) } else { Vec3::ZERO };
         let outside = if stray_sum > 0.0 { outside * (stray_share / stray_sum) } else { Vec3::ZERO };

@@ -28,12 +28,21 @@ fn local(probe: Probe, position: vec3f) -> vec3f {
 }
 
 fn place_weight(probe: Probe, local: vec3f) -> f32 {
+    let w = within(probe, local);
+    let product = w.x * w.y * w.z;
+    return product * product;
+}
+
+fn depth(probe: Probe, local: vec3f) -> f32 {
+    let w = within(probe, local);
+    return min(w.x, min(w.y, w.z));
+}
+
+fn within(probe: Probe, local: vec3f) -> vec3f {
     let against = vec3f(probe.reach.xz, probe.reach_down);
     let along = vec3f(probe.reach.yw, probe.reach_up);
     let c = local / select(along, against, local < vec3f(0.0));
-    let w = max(1.0 - c * c, vec3f(0.0));
-    let product = w.x * w.y * w.z;
-    return product * product;
+    return max(1.0 - c * c, vec3f(0.0));
 }
 
 fn stray_weight(probe: Probe, local: vec3f, normal: vec3f) -> f32 {

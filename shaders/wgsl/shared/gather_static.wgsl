@@ -18,6 +18,11 @@ fn gather_static(position: vec3f, normal: vec3f, geometric_normal: vec3f) -> Gat
     if leaf == NO_LEAF {
         return Gathered();
     }
+    return gather_in(leaf, position, normal, geometric_normal);
+}
+
+// By the probes on surface of this leaf, in which the point need not lie.
+fn gather_in(leaf: u32, position: vec3f, normal: vec3f, geometric_normal: vec3f) -> Gathered {
     let blend = blend(leaf, position, normal);
     var gathered = Gathered(far_light(blend, position, normal), 0u);
     // The probes' lists ascend, so each light is met once, with all probes that see it.

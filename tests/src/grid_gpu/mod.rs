@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec3, Vec4};
 use vlm_format::{Grid, MOST_PROBES};
+use vlm_shaders::cpu::free_light::FreeLight;
 use vlm_shaders::cpu::gather::{Gathered, Receiver};
 use vlm_shaders::cpu::grid::Blend;
 use vlm_shaders::cpu::refresh::{Arrived, FarLight, far_sources};
@@ -21,7 +22,9 @@ pub struct GridPasses {
     gpu: Gpu,
     inject: ComputePipeline,
     refresh: ComputePipeline,
+    refresh_free: ComputePipeline,
     gather: ComputePipeline,
+    gather_free: ComputePipeline,
     places: ComputePipeline,
 }
 
@@ -73,7 +76,9 @@ impl GridPasses {
         Ok(Self {
             inject: gpu.pipeline(&wgsl::inject(), "inject"),
             refresh: gpu.pipeline(&wgsl::refresh(), "refresh"),
+            refresh_free: gpu.pipeline(&wgsl::refresh_free(), "refresh_free"),
             gather: gpu.pipeline(&wgsl::gather_static(), "gather"),
+            gather_free: gpu.pipeline(&wgsl::gather_free(), "gather_moving"),
             places: gpu.pipeline(&places, "find_places"),
             gpu,
         })
@@ -117,7 +122,7 @@ impl GridPasses {
         Ok(Radiosity { lights: self.read_vectors(&of_lights)?, sources: self.read_vectors(&of_sources)? })
     }
 
-    /// What arrives at the probes on surface.
+    /// What arrives at the probes.
     ///
     /// # Errors
     /// If the device is lost.
@@ -137,7 +142,27 @@ impl GridPasses {
         let groups = [self.common(&self.refresh, scene), gpu.group(&self.refresh, 1, &group)];
         self.dispatch(&self.refresh, &groups, grid.probes.len());
         let (far, near) = (self.read(&far)?, self.read_vectors(&near)?);
-        Ok(Arrived { far, near, ..Arrived::default() })
+        Ok(Arrived { far, near, free: self.refresh_free(scene, radiosity)? })
+    }
+
+    /// What arrives at the probes in free space.
+    fn refresh_free(&self, scene: &Uploaded, radiosity: &[Vec3]) -> Result<Vec<FreeLight>, GpuError> {
+        let (gpu, Uploaded { grid, lights, .. }) = (&self.gpu, scene);
+        let count = grid.probes.len() - grid.surface_probes as usize;
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        let free = self.output::<FreeLight>("free", count);
+        let group = [
+            (0, &scene.probes),
+            (1, &gpu.input("rows", bytemuck::cast_slice(&grid.rows))),
+            (3, &gpu.input("sources", bytemuck::cast_slice(&far_sources(lights, &grid.uncovered)))),
+            (4, &self.vectors("radiosity", radiosity)),
+            (5, &free),
+        ];
+        let groups = [self.common(&self.refresh_free, scene), gpu.group_at(&self.refresh_free, 1, &group)];
+        self.dispatch(&self.refresh_free, &groups, count);
+        self.read(&free)
     }
 
     /// Phase 2 by the grid at every receiver.
@@ -150,21 +175,44 @@ impl GridPasses {
         arrived: &Arrived,
         receivers: &[Receiver],
     ) -> Result<Vec<Gathered>, GpuError> {
+        self.gather_by(&self.gather, &[], scene, arrived, receivers)
+    }
+
+    /// Phase 2 at receivers that move; the grid must have probes in free space.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn gather_free(
+        &self,
+        scene: &Uploaded,
+        arrived: &Arrived,
+        receivers: &[Receiver],
+    ) -> Result<Vec<Gathered>, GpuError> {
+        let free = self.gpu.input("free", bytemuck::cast_slice(&arrived.free));
+        self.gather_by(&self.gather_free, &[&free], scene, arrived, receivers)
+    }
+
+    fn gather_by(
+        &self,
+        pipeline: &ComputePipeline,
+        more: &[&Buffer],
+        scene: &Uploaded,
+        arrived: &Arrived,
+        receivers: &[Receiver],
+    ) -> Result<Vec<Gathered>, GpuError> {
         let gpu = &self.gpu;
         let gathered = self.output::<GatheredWords>("gathered", receivers.len());
-        let group = [
-            &scene.probes,
-            &gpu.input("lights", bytemuck::cast_slice(&scene.lights.geometry)),
-            &gpu.input("far", bytemuck::cast_slice(&arrived.far)),
-            &self.vectors("near_radiosities", &arrived.near),
-        ];
+        let (lights, far, near) = (
+            gpu.input("lights", bytemuck::cast_slice(&scene.lights.geometry)),
+            gpu.input("far", bytemuck::cast_slice(&arrived.far)),
+            self.vectors("near_radiosities", &arrived.near),
+        );
+        let group: Vec<&Buffer> =
+            [&scene.probes, &lights, &far, &near].into_iter().chain(more.iter().copied()).collect();
         let points = [&gpu.input("receivers", bytemuck::cast_slice(receivers)), &gathered];
-        let groups = [
-            self.common(&self.gather, scene),
-            gpu.group(&self.gather, 1, &group),
-            gpu.group(&self.gather, 2, &points),
-        ];
-        self.dispatch(&self.gather, &groups, receivers.len());
+        let groups =
+            [self.common(pipeline, scene), gpu.group(pipeline, 1, &group), gpu.group(pipeline, 2, &points)];
+        self.dispatch(pipeline, &groups, receivers.len());
         let gathered: Vec<GatheredWords> = self.read(&gathered)?;
         let widened = |g: GatheredWords| Gathered { irradiance: g.irradiance, pairs: u64::from(g.pairs) };
         Ok(gathered.into_iter().map(widened).collect())
