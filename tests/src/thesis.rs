@@ -8,7 +8,7 @@
 
 use std::time::Instant;
 
-use glam::{UVec3, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 use vlm_bake::gbuffer::GBuffer;
 use vlm_bake::progress::Progress;
@@ -19,6 +19,7 @@ use vlm_format::VlmAsset;
 use vlm_shaders::cpu::form_factor::LightGeometry;
 use vlm_shaders::cpu::gather::{Gathered, Receiver};
 
+use crate::active_hemisphere::{ActiveHemisphere, Lattice};
 use crate::form_factor::textbook::{EdgeForm, textbook_form_factor};
 
 /// Ends a list that is not full.
@@ -53,9 +54,7 @@ pub struct Overflow {
 /// The grid of lists.
 #[derive(Clone, Debug)]
 pub struct ThesisGrid {
-    low: Vec3,
-    cell: Vec3,
-    cells: u32,
+    lattice: Lattice,
     list: usize,
     /// `list` ids per cell, x fastest.
     lists: Vec<u32>,
@@ -65,30 +64,18 @@ pub struct ThesisGrid {
     pub build_seconds: f64,
 }
 
-/// The half ball in which a light acts.
-#[derive(Clone, Copy)]
-struct ActiveHemisphere {
-    centre: Vec3,
-    radius: f32,
-    normal: Vec3,
-}
-
 impl ThesisGrid {
     /// Tests every cell over the box `low..high` against every light.
     #[must_use]
     pub fn build(lights: &[LightGeometry], low: Vec3, high: Vec3, options: &ThesisOptions) -> Self {
         let start = Instant::now();
-        let cells = options.grid.clamp(1, 512);
+        let lattice = Lattice::over(low, high, options.grid);
         let list = options.list.max(1) as usize;
-        let cell = (high - low).max(Vec3::splat(1e-6)) / cells as f32;
-        let hemispheres: Vec<_> =
-            lights.iter().map(|light| active_hemisphere(light, options.range)).collect();
-        let mut lists = vec![NULL; cells.pow(3) as usize * list];
-        let fill = |(index, ids): (usize, &mut [u32])| {
-            let index = index as u32;
-            let position = UVec3::new(index % cells, index / cells % cells, index / cells / cells);
-            let cell_low = low + position.as_vec3() * cell;
-            fill_list(ids, &hemispheres, cell_low, cell_low + cell)
+        let hemispheres = ActiveHemisphere::of_all(lights, options.range);
+        let mut lists = vec![NULL; lattice.count() * list];
+        let fill = |(number, ids): (usize, &mut [u32])| {
+            let [low, high] = lattice.bounds(lattice.position(number as u32));
+            fill_list(ids, &hemispheres, low, high)
         };
         let dropped = lists.par_chunks_mut(list).enumerate().map(fill);
         let overflow = dropped.map(|dropped| Overflow { dropped, cells: u64::from(dropped > 0) }).reduce(
@@ -96,7 +83,13 @@ impl ThesisGrid {
             |a, b| Overflow { dropped: a.dropped + b.dropped, cells: a.cells + b.cells },
         );
         let build_seconds = start.elapsed().as_secs_f64();
-        Self { low, cell, cells, list, lists, overflow, build_seconds }
+        Self { lattice, list, lists, overflow, build_seconds }
+    }
+
+    /// Number of cells.
+    #[must_use]
+    pub fn cells(&self) -> usize {
+        self.lattice.count()
     }
 
     /// What the lists take, bytes.
@@ -113,25 +106,19 @@ impl ThesisGrid {
 
     /// The lights of the cell that holds `p`; points outside use the nearest cell.
     pub fn lights_at(&self, p: Vec3) -> impl Iterator<Item = u32> + '_ {
-        let position =
-            ((p - self.low) / self.cell).max(Vec3::ZERO).as_uvec3().min(UVec3::splat(self.cells - 1));
-        let index = position.x + self.cells * (position.y + self.cells * position.z);
-        let first = index as usize * self.list;
+        self.list_of(self.lattice.number(self.lattice.cell_of(p)))
+    }
+
+    /// The lights of a cell by its number.
+    pub fn list_of(&self, cell: u32) -> impl Iterator<Item = u32> + '_ {
+        let first = cell as usize * self.list;
         self.lists[first..first + self.list].iter().copied().take_while(|&id| id != NULL)
     }
 }
 
-/// The light's radius is the distance from its centroid to the farthest corner.
-fn active_hemisphere(light: &LightGeometry, range: f32) -> ActiveHemisphere {
-    let corners = light.corners();
-    let centre = corners.iter().sum::<Vec3>() / 3.0;
-    let radius = corners.iter().map(|c| c.distance(centre)).fold(0.0, f32::max);
-    ActiveHemisphere { centre, radius: range * radius, normal: light.normal }
-}
-
 /// Writes the lights that reach a cell, in their order, and returns how many did not fit.
 fn fill_list(ids: &mut [u32], hemispheres: &[ActiveHemisphere], low: Vec3, high: Vec3) -> u64 {
-    let reaching = (0_u32..).zip(hemispheres).filter(|(_, hemisphere)| reaches(hemisphere, low, high));
+    let reaching = (0_u32..).zip(hemispheres).filter(|(_, hemisphere)| hemisphere.reaches(low, high));
     let mut count = 0;
     for (id, _) in reaching {
         if let Some(slot) = ids.get_mut(count) {
@@ -140,16 +127,6 @@ fn fill_list(ids: &mut [u32], hemispheres: &[ActiveHemisphere], low: Vec3, high:
         count += 1;
     }
     count.saturating_sub(ids.len()) as u64
-}
-
-/// The ball overlaps the box, and some corner of the box is in front of the light.
-fn reaches(hemisphere: &ActiveHemisphere, low: Vec3, high: Vec3) -> bool {
-    let nearest = hemisphere.centre.clamp(low, high);
-    if nearest.distance_squared(hemisphere.centre) > hemisphere.radius * hemisphere.radius {
-        return false;
-    }
-    let farthest = Vec3::select(hemisphere.normal.cmpge(Vec3::ZERO), high, low);
-    hemisphere.normal.dot(farthest - hemisphere.centre) > 0.0
 }
 
 /// Sums the form factors of the listed lights.

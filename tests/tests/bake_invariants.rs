@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use glam::{DMat3, DMat4, DVec3, Vec3};
+use glam::{DMat3, DMat4, DVec3, IVec3, Vec3};
 use vlm_bake::bake::{Bake, bake};
 use vlm_bake::options::{BakeOptions, Preset};
 use vlm_bake::progress::Silent;
@@ -10,6 +10,7 @@ use vlm_bake::scene::{LoadOptions, Scene, load};
 use vlm_format::{GltfFile, Grid, Leaf, VlmAsset};
 use vlm_shaders::cpu::grid::leaf_at;
 use vlm_tests::assets;
+use vlm_tests::rooms::two_rooms;
 
 /// A light in world space.
 struct Light {
@@ -91,6 +92,9 @@ fn faults(scene: &Scene, Bake { asset, report, .. }: &Bake) -> Vec<String> {
     check(lit == 0, format!("{lit} untagged lights light a point for which they stand"));
     if let Some(grid) = &asset.grid {
         let [unserved, unsorted, bright, tagged] = grid_errors(grid, asset, &lights);
+        let [blank, unplaced] = volume_errors(grid, scene);
+        check(blank == 0, format!("{blank} places of volumes without probes in free space"));
+        check(unplaced == 0, format!("{unplaced} probes in free space outside of all volumes"));
         check(unserved == 0, format!("{unserved} places without probes"));
         check(unsorted == 0, format!("{unsorted} leaves whose probes do not ascend"));
         check(bright == 0, format!("{bright} probes that see more than a hemisphere"));
@@ -128,7 +132,8 @@ fn grid_errors(grid: &Grid, asset: &VlmAsset, lights: &[Light]) -> [usize; 4] {
     };
     let unserved =
         lights.iter().flat_map(|l| &l.samples).filter(|(place, _)| !served(place.as_vec3())).count();
-    let list = |leaf: &[Leaf]| &grid.leaf_probes[leaf[0].probes as usize..leaf[0].free_probes as usize];
+    // Numbers of probes in free space are above all others, so the whole list ascends.
+    let list = |leaf: &[Leaf]| &grid.leaf_probes[leaf[0].probes as usize..leaf[1].probes as usize];
     let unsorted = grid.leaves.windows(2).filter(|leaf| !list(leaf).is_sorted_by(|a, b| a < b)).count();
     let sum = |probe: usize| {
         grid.row(probe).map(|(_, weight)| weight as f32 * grid.probes[probe].row_scale).sum::<f32>()
@@ -137,6 +142,70 @@ fn grid_errors(grid: &Grid, asset: &VlmAsset, lights: &[Light]) -> [usize; 4] {
     let tag = |&near: &u32| asset.tags.get(near as usize).copied().unwrap_or(0);
     let tagged = grid.near.iter().filter(|near| tag(near) != 0).count();
     [unserved, unsorted, bright, tagged]
+}
+
+/// Places along each axis of a volume at which it is looked into.
+const LOOKS: i32 = 9;
+
+/// Places of volumes whose leaf lists no probe in free space, and probes in free space that lie in none of the volumes, but for a cell's room.
+fn volume_errors(grid: &Grid, scene: &Scene) -> [usize; 2] {
+    let places = |[low, high]: [DVec3; 2]| {
+        (0..LOOKS.pow(3)).map(move |i| {
+            let at = IVec3::new(i % LOOKS, i / LOOKS % LOOKS, i / LOOKS / LOOKS).as_dvec3() + 0.5;
+            (low + at / f64::from(LOOKS) * (high - low)).as_vec3()
+        })
+    };
+    let served = |place: Vec3| {
+        leaf_at(grid, place).is_some_and(|leaf| {
+            grid.leaves[leaf as usize].free_probes < grid.leaves[leaf as usize + 1].probes
+        })
+    };
+    let blank = scene.volumes.iter().flat_map(|&volume| places(volume)).filter(|&p| !served(p)).count();
+    let room = f64::from(grid.cell_size);
+    let inside = |p: DVec3| {
+        let within = |[low, high]: &[DVec3; 2]| p.cmpge(*low - room).all() && p.cmple(*high + room).all();
+        scene.volumes.iter().any(within)
+    };
+    let free = &grid.probes[grid.surface_probes as usize..];
+    [blank, free.iter().filter(|probe| !inside(probe.position.as_dvec3())).count()]
+}
+
+/// Two rooms parted by a thin wall, the second of which is a volume up to its walls.
+fn with_volume() -> Scene {
+    let mut scene = two_rooms(0.02);
+    scene.volumes = vec![[DVec3::new(0.01, 0.0, -2.0), DVec3::new(4.0, 3.0, 2.0)]];
+    scene
+}
+
+#[test]
+fn a_scene_with_a_volume() {
+    let scene = with_volume();
+    let mut baked = bake(&scene, &options(&scene, 600), &Silent).unwrap();
+    let grid = baked.asset.grid.as_ref().unwrap();
+    assert!(grid.probes.len() > grid.surface_probes as usize + 50);
+    assert_eq!(faults(&scene, &baked), Vec::<String>::new());
+
+    // The negative controls: leaves that lost their probes in free space, and a probe that strayed.
+    let whole = grid.clone();
+    let spoilt = |spoil: &dyn Fn(&mut Grid)| {
+        let mut grid = whole.clone();
+        spoil(&mut grid);
+        grid
+    };
+    let lost = spoilt(&|grid| {
+        for leaf in 0..grid.leaves.len() - 1 {
+            grid.leaves[leaf].free_probes = grid.leaves[leaf + 1].probes;
+        }
+    });
+    assert!(volume_errors(&lost, &scene)[0] > 0);
+    let strayed = spoilt(&|grid| grid.probes.last_mut().unwrap().position.x = -3.0);
+    assert_eq!(volume_errors(&strayed, &scene), [0, 1]);
+    let swapped = spoilt(&|grid| {
+        let leaf = grid.leaves.windows(2).find(|leaf| leaf[1].probes > leaf[0].free_probes + 1).unwrap();
+        grid.leaf_probes[leaf[0].free_probes as usize..leaf[1].probes as usize].reverse();
+    });
+    baked.asset.grid = Some(swapped);
+    assert_eq!(faults(&scene, &baked).len(), 1, "one list does not ascend");
 }
 
 fn check_folder(folder: &str, skip: &[&str], most_lights: u32) {

@@ -25,15 +25,21 @@ fn a_small_run_writes_rows_a_table_and_figures() {
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
 
     let rows = rows(&out);
-    assert_eq!(rows.len(), 2 * 2 * 2 * 2 * 2, "scenes, lights, cells, builds, repeats");
+    assert_eq!(rows.len(), 2 * 2 * 2 * 3 * 2, "scenes, lights, cells, builds, repeats");
     for row in &rows {
         assert!(row.entries > 0 && row.stored_cells > 0 && row.stored_cells <= row.cells, "{row:?}");
         let words = row.bytes / 4;
         match row.builder.as_str() {
             // A number and the start of its list for each stored cell, one start more, and the lists.
-            "ours" => assert_eq!((words, row.dropped), (2 * row.stored_cells + 1 + row.entries, 0)),
+            "scatter" | "scatter to surface" => {
+                assert_eq!(words, 2 * row.stored_cells + 1 + row.entries);
+                assert!(0 < row.tests && row.tests < row.lights * row.cells);
+            }
             // Padded lists.
-            "thesis" => assert_eq!((words, row.stored_cells), (128 * row.cells, row.cells)),
+            "thesis" => {
+                assert_eq!((words, row.stored_cells), (128 * row.cells, row.cells));
+                assert_eq!(row.tests, row.lights * row.cells);
+            }
             other => panic!("{other}"),
         }
     }
@@ -41,7 +47,7 @@ fn a_small_run_writes_rows_a_table_and_figures() {
         let of = rows.iter().filter(|r| r.builder == builder && r.cells_per_axis == cells);
         of.map(|row| row.entries).sum::<u64>()
     };
-    assert!(entries("ours", 8) > entries("ours", 4), "finer cells hold more entries");
+    assert!(entries("scatter", 8) > entries("scatter", 4), "finer cells hold more entries");
 
     let table = std::fs::read_to_string(out.join("table.md")).unwrap();
     assert_eq!(table, String::from_utf8(done.stdout).unwrap());

@@ -8,7 +8,7 @@ use vlm_bake::gbuffer::GBuffer;
 use vlm_bake::options::{BakeOptions, Preset};
 use vlm_bake::progress::Silent;
 use vlm_bake::reference::indirect_irradiance;
-use vlm_bake::render::gather_by_grid;
+use vlm_bake::render::{gather_brute, gather_by_grid};
 use vlm_bake::scene::{LoadOptions, Scene, load};
 use vlm_bake::shade::TraceScene;
 use vlm_format::GltfFile;
@@ -29,23 +29,28 @@ struct Leak {
     truth: f32,
     /// Relative RMSE of the dark side.
     error: f32,
-    brute_error: f32,
+    /// The same of a grid through whose walls a tenth of the light comes that would come without them.
+    leaky: f32,
+    leaky_error: f32,
 }
 
 fn leak(name: &str, scene: &Scene, lights: u32, [lit, dark]: [&[Receiver]; 2]) -> Leak {
     let asset = baked(scene, lights).unwrap();
     let [lit_found, dark_found] = [lit, dark].map(|r| irradiance(scene, &asset, r).unwrap());
     let [lit_truth, dark_truth] = [lit, dark].map(|r| truth(scene, r, SPP));
+    let tenth = |(grid, brute): (&Vec3, &Vec3)| *grid + 0.1 * *brute;
+    let leaky: Vec<Vec3> = dark_found.grid.iter().zip(&dark_found.brute).map(tenth).collect();
     let leak = Leak {
         grid: mean(&dark_found.grid) / mean(&lit_found.grid),
         brute: mean(&dark_found.brute) / mean(&lit_found.brute),
         truth: mean(&dark_truth) / mean(&lit_truth),
         error: relative_rmse(&dark_found.grid, &dark_truth),
-        brute_error: relative_rmse(&dark_found.brute, &dark_truth),
+        leaky: mean(&leaky) / mean(&lit_found.grid),
+        leaky_error: relative_rmse(&leaky, &dark_truth),
     };
     println!(
-        "{name}: dark over lit {:.5} by the grid, {:.5} in truth, {:.5} without occlusion; relative RMSE {:.3}, {:.3} without occlusion",
-        leak.grid, leak.truth, leak.brute, leak.error, leak.brute_error
+        "{name}: dark over lit {:.5} by the grid, {:.5} in truth, {:.5} without occlusion; relative RMSE {:.3}; {:.5} and {:.3} with a leak",
+        leak.grid, leak.truth, leak.brute, leak.error, leak.leaky, leak.leaky_error
     );
     leak
 }
@@ -56,8 +61,8 @@ impl Leak {
         (self.grid / self.truth - 1.0).abs()
     }
 
-    fn brute_off(&self) -> f32 {
-        (self.brute / self.truth - 1.0).abs()
+    fn leaky_off(&self) -> f32 {
+        (self.leaky / self.truth - 1.0).abs()
     }
 }
 
@@ -76,9 +81,9 @@ fn a_wall_thinner_than_a_cell_passes_no_light() {
         println!(
             "wall of {thickness} m: dark over lit {by_grid}, at worst {worst}; without occlusion {by_brute}"
         );
-        assert!(by_grid < 1e-4 && worst < 1e-3, "{thickness} m: {by_grid} {worst}");
+        assert!(by_grid < 1e-6 && worst < 1e-6, "{thickness} m: {by_grid} {worst}");
         // The negative control: without occlusion the wall passes much.
-        assert!(by_brute > 0.02);
+        assert!(by_brute > 0.15);
     }
 }
 
@@ -103,9 +108,9 @@ fn a_door_that_is_ajar_passes_as_much_as_in_truth() {
     let dark = across(Vec2::new(0.5, -1.9), Vec2::new(3.9, 1.9), 24);
     let leak = leak("door ajar", &scene, 1000, [&lit, &dark]);
     assert!(leak.truth > 1e-3 && leak.truth < 0.2, "{}", leak.truth);
-    assert!(leak.off() < 0.25, "{}", leak.off());
-    assert!(leak.error < 0.7, "{}", leak.error);
-    assert!(leak.brute_off() > 0.25 && leak.brute_error > 0.7, "the negative control");
+    assert!(leak.off() < 0.22, "{}", leak.off());
+    assert!(leak.error < 0.6, "{}", leak.error);
+    assert!(leak.leaky_off() > 0.22 && leak.leaky_error > 0.6, "the negative control");
 }
 
 /// A room of 4 x 3 x 4 m with a lamp, cd.
@@ -125,9 +130,12 @@ fn the_floor_behind_a_pillar_is_as_dark_as_in_truth() {
     let dark = across(Vec2::new(0.2, -0.12), Vec2::new(0.5, 0.12), 16);
     let leak = leak("pillar", &scene, 1000, [&lit, &dark]);
     assert!(leak.truth < 0.8, "{}", leak.truth);
-    assert!(leak.off() < 0.4, "{}", leak.off());
-    assert!(leak.error < 0.35, "{}", leak.error);
-    assert!(leak.brute_off() > 0.4 && leak.brute_error > 0.35, "the negative control");
+    // It comes out a third too bright. The shadow is 0.3 m wide, and a pixel in it blends probes that reach up to 0.36 m, some of which lie
+    // where the wall by the lamp is seen past the pillar: light is too bright by half at the shadow's edges, by a tenth in its middle. Of 3,000
+    // probes the shadow is 18 % too bright, of 48,000 13 %, with 16,000 lights 9 %; near lights do nothing, and rays nothing for the better.
+    assert!(leak.off() < 0.36, "{}", leak.off());
+    assert!(leak.error < 0.29, "{}", leak.error);
+    assert!(leak.leaky_off() > 0.36 && leak.leaky_error > 0.29, "the negative control");
 }
 
 #[test]
@@ -142,9 +150,9 @@ fn the_floor_below_a_table_is_as_dark_as_in_truth() {
     let dark = across(Vec2::new(-0.5, -0.35), Vec2::new(0.5, 0.35), 16);
     let leak = leak("table", &scene, 1000, [&lit, &dark]);
     assert!(leak.truth < 0.6, "{}", leak.truth);
-    assert!(leak.off() < 0.15, "{}", leak.off());
-    assert!(leak.error < 0.2, "{}", leak.error);
-    assert!(leak.brute_off() > 0.15 && leak.brute_error > 0.2, "the negative control");
+    assert!(leak.off() < 0.05, "{}", leak.off());
+    assert!(leak.error < 0.05, "{}", leak.error);
+    assert!(leak.leaky_off() > 0.05 && leak.leaky_error > 0.05, "the negative control");
 }
 
 #[test]
@@ -155,16 +163,24 @@ fn veach_ajar_is_as_bright_as_in_truth() {
     let options = BakeOptions::preset(Preset::Game, scene.triangles.len());
     let asset = bake(&scene, &options, &Silent).unwrap().asset;
     let trace = TraceScene::new(&scene);
-    let view = GBuffer::trace(&trace, &scene.cameras[0], 64, 36);
-    let truth = indirect_irradiance(&trace, &view.points, view.width, 256, &Silent);
-    let (found, _) = gather_by_grid(&trace, &asset, &view, &Silent).unwrap();
-    let (brute, _) = vlm_bake::render::gather_brute(&trace, &asset, &view, &Silent).unwrap();
-    let ratio = mean(&found) / mean(&truth);
-    let brute = mean(&brute) / mean(&truth);
-    println!(
-        "veach_ajar: mean over the truth's {ratio}, {brute} without occlusion; relative RMSE {}",
-        relative_rmse(&found, &truth)
-    );
-    assert!((ratio - 1.0).abs() < 0.25, "{ratio}");
-    assert!((brute - 1.0).abs() > 0.25, "the negative control");
+    // The front room gets all its light through the gap of the door; the back room holds the lamp.
+    for (name, most_off, most_error) in [("front", 0.1, 0.35), ("back", 0.03, 0.04)] {
+        let camera = scene.cameras.iter().find(|camera| camera.name == name).unwrap();
+        let view = GBuffer::trace(&trace, camera, 64, 36);
+        let truth = indirect_irradiance(&trace, &view.points, view.width, 1024, &Silent);
+        let (found, _) = gather_by_grid(&trace, &asset, &view, &Silent).unwrap();
+        let (brute, _) = gather_brute(&trace, &asset, &view, &Silent).unwrap();
+        let (ratio, brute) = (mean(&found) / mean(&truth), mean(&brute) / mean(&truth));
+        let error = relative_rmse(&found, &truth);
+        println!(
+            "veach_ajar, {name}: mean over the truth's {ratio}, {brute} without occlusion; relative RMSE {error}"
+        );
+        assert!((ratio - 1.0).abs() < most_off && error < most_error, "{ratio} {error}");
+        if name == "front" {
+            assert!(
+                (ratio + 0.01 * brute - 1.0).abs() > most_off,
+                "the negative control: a leak of a hundredth"
+            );
+        }
+    }
 }

@@ -107,22 +107,22 @@ fn nothing_pops_on_the_way_through_a_volume() {
         [Vec3::new(0.04, 0.93, 0.05), Vec3::new(0.96, 0.66, 0.95)],
         [Vec3::new(0.05, 0.15, 0.93), Vec3::new(0.97, 0.2, 0.93)],
     ];
-    for (ends, normal) in paths.into_iter().zip([Vec3::new(0.6, -0.8, 0.0), Vec3::new(-0.48, 0.6, 0.64)]) {
+    let normals = [Vec3::new(0.6, -0.8, 0.0), Vec3::new(-0.48, 0.6, 0.64)];
+    // Of the mean light: a fifth above what is measured, and a tenth of the truth's own steps, or a fifth.
+    for ((ends, normal), most) in paths.into_iter().zip(normals).zip([0.0037, 0.009]) {
         let [from, to] = ends.map(|at| low + at * (high - low));
         let count = 4000;
         let path: Vec<Receiver> =
             (0..count).map(|i| receiver(from.lerp(to, i as f32 / (count - 1) as f32), normal)).collect();
         let free = irradiance(&scene, &asset, &path).unwrap().free;
         let truth = truth(&scene, &path, 1024);
-        let most = 1.5 * largest_step(&truth) + 2e-3 * mean(&truth);
         let share = |values: &[Vec3]| largest_step(values) / mean(&truth);
         println!("path: largest step {} of the mean, the truth's {}", share(&free), share(&truth));
-        assert!(largest_step(&free) <= most, "{} {most}", largest_step(&free));
-        assert!(share(&free) < 0.01);
-        // The negative controls: the nearest probe pops, and so does a step of a tenth.
-        assert!(largest_step(&of_nearest_probe(&scene, &asset, &path)) > most);
-        let stepped = free.iter().enumerate().map(|(i, e)| if i < count / 2 { *e } else { *e * 1.1 });
-        assert!(largest_step(&stepped.collect::<Vec<_>>()) > most);
+        assert!(share(&free) < most && most < 0.2 * share(&truth), "{} {most}", share(&free));
+        // The negative controls: the nearest probe pops, and so does a step of a fiftieth.
+        assert!(share(&of_nearest_probe(&scene, &asset, &path)) > most);
+        let stepped = free.iter().enumerate().map(|(i, e)| if i < count / 2 { *e } else { *e * 1.02 });
+        assert!(share(&stepped.collect::<Vec<_>>()) > most);
     }
 }
 
@@ -196,5 +196,6 @@ fn volumes_survive_the_file_and_pixels_outside_of_them_stay_sane() {
     let inside: Vec<Receiver> = random_receivers(&scene, [low, high].map(|c: DVec3| c.as_vec3()), 0.3, 200);
     let found = irradiance(&scene, &asset, &inside).unwrap().free;
     let black = found.iter().filter(|e| e.max_element() == 0.0).count();
-    assert!(black * 50 <= found.len(), "{black} of 200 places of the room are black");
+    println!("outside of volumes: {black} of {} places are black", found.len());
+    assert!(inside.len() == 200 && black <= 3, "{black} of 200 places of the room are black");
 }

@@ -107,14 +107,11 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     let snap = Snap::new(&patches);
     let density = densities(scene, &patches, &mesh, &points_of_lights(&light_of_point, coarse.len()));
     let budget = (options.lights as usize).saturating_sub(authored::count(scene));
-    let mut hidden = mend(scene, Refiner::new(mesh, density, &snap), budget, &around, &points);
-
-    clock.stage("verify")?;
-    let lights = &hidden.lights;
-    let violations = std::mem::take(&mut hidden.violations);
+    let hidden = mend(scene, Refiner::new(mesh, density, &snap), budget, &around, &points);
 
     clock.stage("samples")?;
-    let accused = accusations(&patches, lights, violations);
+    let lights = &hidden.lights;
+    let accused = accusations(&patches, lights, &hidden.violations);
     let standing = points_of_lights(&hidden.light_of_point, lights.len());
     let sources = Sources {
         scene,

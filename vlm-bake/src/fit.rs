@@ -1,8 +1,8 @@
 //! Places a light that fails by itself, where it hides.
 //!
 //! It sinks, shrinks, turns, and moves to another part of what it stands for. A light of half the size reaches half as high over its
-//! points' horizons, and stands for surface half as far away: what it leaves is another light's or not covered, and a larger radiosity keeps the
-//! flux. So a smaller light always has less to hide from; the largest that hides is taken.
+//! points' horizons, and stands for surface half as far away: what it leaves is another light's or not covered, and a larger radiosity
+//! keeps the flux. So a smaller light always has less to hide from; the largest that hides is taken.
 
 use glam::{DQuat, DVec3, Vec3A};
 
@@ -12,8 +12,8 @@ use crate::correspondence::{LEAST_COSINE, Light};
 use crate::surface::SurfacePoint;
 use crate::verify::judge::{Evidence, hides};
 
-/// The sizes to which a light may shrink, largest first. Smaller ones hide more lights instead of tagging them, and let their surface's light
-/// come from too small a place, which is seen from near by.
+/// The sizes to which a light may shrink, largest first. Smaller ones hide more lights instead of tagging them, and let their surface's
+/// light come from too small a place, which is seen from near by.
 const SIZES: [f64; 10] = [1.0, 0.85, 0.7, 0.5, 0.35, 0.25, 0.17, 0.12, 0.08, 0.05];
 
 /// Down to this size a light stays over the middle of where it was; smaller ones may move to any part of what it stood for.

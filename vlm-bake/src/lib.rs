@@ -1,7 +1,7 @@
 //! Bakes Virtual Light Meshes from glTF, and renders them on the CPU.
 //!
 //! Stages of the bake, in the order in which data flows:
-//! `scene -> patches -> decimate -> refine, offset, mend -> verify -> samples, flux -> authored -> tag, prove -> grid -> write`.
+//! `scene -> patches -> decimate -> refine, offset, mend (verify) -> samples, flux -> authored -> tag, prove -> grid -> write`.
 //! For pictures on the CPU: `scene, bvh -> camera -> shade -> gbuffer -> reference | render -> picture`.
 
 // No input may crash a program that links this.

@@ -22,20 +22,17 @@ const PROOFS: usize = 4;
 
 /// What each light must not light.
 #[must_use]
-pub fn accusations(
-    patches: &Patches,
-    lights: &[Light],
-    violations: Vec<Violation>,
-) -> Vec<Option<Accusation>> {
+pub fn accusations(patches: &Patches, lights: &[Light], violations: &[Violation]) -> Vec<Option<Accusation>> {
     let mut accused: Vec<Option<Accusation>> = vec![None; lights.len()];
     let two_sided = |v: &Violation| patches.regions[lights[v.light as usize].region as usize].two_sided;
     let neighbours = violations.iter().any(two_sided).then(|| SmoothNeighbours::new(patches));
-    for mut violation in violations {
-        let two_sided = two_sided(&violation);
+    for violation in violations {
+        let two_sided = two_sided(violation);
+        let mut accused_triangles = violation.triangles.clone();
         if let Some(neighbours) = neighbours.as_ref().filter(|_| two_sided) {
-            neighbours.widen(&mut violation.triangles);
+            neighbours.widen(&mut accused_triangles);
         }
-        let triangles = violation.triangles.iter().flat_map(|&t| patches.scene_triangles(t)).collect();
+        let triangles = accused_triangles.iter().flat_map(|&t| patches.scene_triangles(t)).collect();
         accused[violation.light as usize] =
             Some(Accusation { triangles, reason: reason(two_sided, violation.pokes_out) });
     }

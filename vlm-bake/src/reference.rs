@@ -119,8 +119,8 @@ fn random_shift(seed: u64) -> (u32, u32) {
     (bits as u32, (bits >> 32) as u32)
 }
 
-/// Of `count` directions around a surface's shading normal with density `cos(theta) / pi`, stratified, those above the surface itself; `seed`
-/// chooses them.
+/// Of `count` directions around a surface's shading normal with density `cos(theta) / pi`, stratified, those above the surface itself;
+/// `seed` chooses them.
 pub fn directions_above(surface: &SurfacePoint, count: u32, seed: u64) -> impl Iterator<Item = Vec3> {
     let (tangent, bitangent) = surface.normal.any_orthonormal_pair();
     let frame = Mat3::from_cols(tangent, bitangent, surface.normal);

@@ -108,7 +108,8 @@ const MOST_SAMPLES_SHARE: f64 = 64.0;
 /// A light much smaller than the mean has at least this share of samples.
 const LEAST_SAMPLES_SHARE: f64 = 0.25;
 
-/// The finished lights, each with about `count` samples: more where it is larger than the mean, fewer where it is smaller. Lights without any surface are left out.
+/// The finished lights, each with about `count` samples: more where it is larger than the mean, fewer where it is smaller. Lights without
+/// any surface are left out.
 #[must_use]
 pub fn samples(sources: &Sources, lights: &[Light], count: u32) -> Vec<BakedLight> {
     // The ratio of areas is the group's: over one light, the number of points fluctuates too much.

@@ -1,8 +1,8 @@
 //! Which light stands for each point, kept up to date while lights move.
 //!
 //! A search of every point's light costs more than all else that hides lights. So only points whose own light changed look
-//! again, and those that have none look among the lights that changed. A point whose light stayed keeps it, though another may have come nearer by a
-//! clearance or so; the proof of the finished file looks for every point anew.
+//! again, and those that have none look among the lights that changed. A point whose light stayed keeps it, though another may have come
+//! nearer by a clearance or so; the proof of the finished file looks for every point anew.
 
 use rayon::prelude::*;
 

@@ -17,8 +17,8 @@ pub const PROCESS: &str = "process";
 pub const BAKE: &str = "bake";
 
 /// Phases of our process in their order: reading, the stages of [`vlm_bake::bake::bake`], writing.
-pub const PHASES: [&str; 10] =
-    ["load", "patches", "decimate", "mend", "verify", "samples", "authored", "grid", "tag", "write"];
+pub const PHASES: [&str; 9] =
+    ["load", "patches", "decimate", "mend", "samples", "authored", "tag", "grid", "write"];
 
 /// One sample. Every repeat is one of its own.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -218,7 +218,7 @@ pub(super) mod tests {
         let room = cells(&text, "| room | 10,000 |");
         assert_eq!(room[column("lights")], "460");
         assert_eq!(room[column("decimate")], "0.0158", "the median, not the mean of 0.0161");
-        assert_eq!(room[column("verify")], "-");
+        assert_eq!(room[column("mend")], "-");
         assert_eq!(room[column("peak memory")], "10.0 MB");
         assert_eq!(room[column("gltfpack -si 0.1")], "0.0100");
         for start in ["| **exponent** |", "| **exponent, 80,000"] {
@@ -227,7 +227,7 @@ pub(super) mod tests {
             assert_eq!(exponents[column("load")], "0.00");
             assert_eq!(exponents[column("peak memory")], "1.00");
             assert_eq!(exponents[column("gltfpack -si 0.1")], "1.00");
-            assert_eq!(exponents[column("verify")], "-");
+            assert_eq!(exponents[column("mend")], "-");
         }
         assert!(!cells(&text, "| hall | 777 |")[0].is_empty());
         assert!(text.contains("Not on this machine: sponza") && text.contains("gltfpack 9.9"));

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::GridBenchError;
-use super::row::{OURS, Row, THESIS};
+use super::row::{BUILDERS, Row, SCATTER, THESIS};
 use super::table::seconds;
 use crate::pareto::names::file_name;
 use crate::plot::{Axis, Curve, Figure, Line, Marker, Point};
@@ -22,12 +22,15 @@ pub fn write(folder: &Path, rows: &[Row]) -> Result<(), GridBenchError> {
 fn figure(scene: &str, rows: &[Row]) -> Figure {
     let cells: BTreeSet<u32> = rows.iter().map(|row| row.cells_per_axis).collect();
     let curve = |builder: &str, (series, &cells): (usize, &u32)| {
-        let (line, marker) =
-            if builder == OURS { (Line::Solid, Marker::Filled) } else { (Line::Dashed, Marker::Hollow) };
+        let (line, marker) = match builder {
+            THESIS => (Line::Dashed, Marker::Hollow),
+            SCATTER => (Line::Solid, Marker::Hollow),
+            _ => (Line::Solid, Marker::Filled),
+        };
         let name = format!("{builder}, {cells}^3 cells");
         Curve { line, marker, ..Curve::new(&name, series, points(rows, builder, cells)) }
     };
-    let curves = [THESIS, OURS].map(|builder| cells.iter().enumerate().map(move |c| curve(builder, c)));
+    let curves = BUILDERS.map(|builder| cells.iter().enumerate().map(move |c| curve(builder, c)));
     Figure {
         title: format!("Building the grid: {scene}"),
         subtitle: rows.first().map_or_else(String::new, |row| {
@@ -60,10 +63,17 @@ mod tests {
         let names: Vec<&str> = figure.curves.iter().map(|curve| curve.name.as_str()).collect();
         assert_eq!(
             names,
-            ["thesis, 16^3 cells", "thesis, 32^3 cells", "ours, 16^3 cells", "ours, 32^3 cells"]
+            [
+                "thesis, 16^3 cells",
+                "thesis, 32^3 cells",
+                "scatter, 16^3 cells",
+                "scatter, 32^3 cells",
+                "scatter to surface, 16^3 cells",
+                "scatter to surface, 32^3 cells"
+            ]
         );
         let counts: Vec<usize> = figure.curves.iter().map(|curve| curve.points.len()).collect();
-        assert_eq!(counts, [2, 1, 2, 2], "what was not run has no point");
+        assert_eq!(counts, [2, 1, 2, 2, 2, 2], "what was not run has no point");
         assert_eq!(figure.curves[3].points[1].x, 1e4 * 32f64.powi(3));
         assert!((figure.curves[3].points[1].y - 0.02).abs() < 1e-12);
     }

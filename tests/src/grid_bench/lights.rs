@@ -1,7 +1,8 @@
 //! Lights to fill grids with.
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use vlm_bake::bake::bake;
+use vlm_bake::grid::GridOptions;
 use vlm_bake::options::{BakeOptions, Preset};
 use vlm_bake::progress::Silent;
 use vlm_bake::render::world_lights;
@@ -16,21 +17,6 @@ use crate::room;
 /// Name of the room made in memory.
 pub const ROOM: &str = "room";
 
-/// Lights in the forms that the two builds take.
-pub struct Lights {
-    /// Corners in world space, metres.
-    pub corners: Vec<[DVec3; 3]>,
-    /// The same.
-    pub geometry: Vec<LightGeometry>,
-}
-
-impl Lights {
-    fn new(corners: impl Iterator<Item = [Vec3; 3]>) -> Self {
-        let corners: Vec<_> = corners.map(|corners| corners.map(|v| v.as_dvec3())).collect();
-        Self { geometry: corners.iter().map(|&corners| LightGeometry::new(corners)).collect(), corners }
-    }
-}
-
 /// The scene of a name; `surface` triangles for the room.
 pub fn load_scene(name: &str, surface: u64) -> Result<Scene, GridBenchError> {
     let file = if name == ROOM {
@@ -44,14 +30,19 @@ pub fn load_scene(name: &str, surface: u64) -> Result<Scene, GridBenchError> {
 /// About `count` lights of a scene. For the room, the triangles of a room of about that many: lights of about one size all
 /// over the surface, which fall in radius with the square root of their number, as baked ones do. Else those of a bake with
 /// that budget.
-pub fn lights(name: &str, scene: &Scene, count: u32) -> Result<Lights, GridBenchError> {
+pub fn lights(name: &str, scene: &Scene, count: u32) -> Result<Vec<LightGeometry>, GridBenchError> {
     if name == ROOM {
-        return Ok(Lights::new(room::corners(&room::parts(u64::from(count)))));
+        let parts = room::parts(u64::from(count));
+        return Ok(room::corners(&parts)
+            .map(|corners| LightGeometry::new(corners.map(|v: Vec3| v.as_dvec3())))
+            .collect());
     }
-    let options = BakeOptions { lights: count, ..BakeOptions::preset(Preset::Game, scene.triangles.len()) };
+    let preset = BakeOptions::preset(Preset::Game, scene.triangles.len());
+    let grid = GridOptions { probes: 0, ..preset.grid };
+    let options = BakeOptions { lights: count, grid, ..preset };
     let baked = bake(scene, &options, &Silent)
         .map_err(|error| GridBenchError::Bake { scene: name.to_owned(), error })?;
     let lights = world_lights(scene, &baked.asset)
         .map_err(|error| GridBenchError::Lights { scene: name.to_owned(), error })?;
-    Ok(Lights::new(lights.geometry.iter().map(|light| light.corners())))
+    Ok(lights.geometry)
 }

@@ -1,14 +1,15 @@
-//! The measurement: every number of lights and cells by both builds, in one interleaved run.
+//! The measurement: every number of lights and cells by every build, in one interleaved run.
 
 use std::time::Instant;
 
-use glam::Vec3;
 use vlm_bake::scene::Scene;
+use vlm_shaders::cpu::form_factor::LightGeometry;
 
 use super::GridBenchError;
-use super::lights::{Lights, lights, load_scene};
-use super::row::{OURS, Row, THESIS};
-use super::scatter::light_lists;
+use super::lights::{lights, load_scene};
+use super::row::{BUILDERS, Row, SCATTER, SURFACE, THESIS};
+use super::scatter::{LightLists, StoredCells, scatter};
+use crate::active_hemisphere::{ActiveHemisphere, Lattice};
 use crate::device::processor;
 use crate::random;
 use crate::thesis::{ThesisGrid, ThesisOptions};
@@ -20,11 +21,11 @@ pub struct GridOptions {
     pub scenes: Vec<String>,
     /// Numbers of lights. The grids hold about so many; the rows say how many.
     pub lights: Vec<u32>,
-    /// Cells along the longest axis, 1 to 256.
+    /// Cells along every axis, 1 to 256.
     pub cells: Vec<u32>,
-    /// Reach of a light over its radius. Our build's time and entries grow with its square at least.
+    /// Reach of a light over its radius. Scattering's time and entries grow with its square at least.
     pub range: f32,
-    /// Entries of each of the thesis' lists. Its bytes are in proportion.
+    /// The most entries of a list. The thesis' bytes are in proportion.
     pub list: u32,
     /// Triangles of the room's surface.
     pub surface: u64,
@@ -40,8 +41,8 @@ impl Default for GridOptions {
             scenes: vec!["room".to_owned()],
             lights: vec![1_000, 3_000, 10_000, 30_000, 100_000],
             cells: vec![16, 32, 64, 100],
-            range: 8.0,
-            list: 128,
+            range: ThesisOptions::default().range,
+            list: ThesisOptions::default().list,
             surface: 100_000,
             limit: 20.0,
             repeats: 3,
@@ -58,18 +59,26 @@ struct Build {
     cells: u32,
 }
 
+/// What a build made.
+enum Built {
+    /// Lists of one length.
+    Padded(ThesisGrid),
+    /// Lists as long as they need be.
+    Compact(LightLists),
+}
+
 /// Builds all grids of all scenes, and returns a row for each build. `log` is told what is going on.
 ///
 /// # Errors
-/// [`GridBenchError`] for scenes that cannot be had.
+/// [`GridBenchError`] for scenes that cannot be had, and for builds that disagree.
 pub fn measure(options: &GridOptions, log: &dyn Fn(&str)) -> Result<Vec<Row>, GridBenchError> {
     let mut rows = Vec::new();
     for name in &options.scenes {
         log(&format!("{name}: lights"));
         let scene = load_scene(name, options.surface)?;
-        let lights: Result<Vec<Lights>, _> =
+        let lights: Result<Vec<Vec<LightGeometry>>, _> =
             options.lights.iter().map(|&count| lights(name, &scene, count)).collect();
-        rows.extend(Measurement { options, name, scene: &scene, lights: &lights?, log }.rows());
+        rows.extend(Measurement { options, name, scene: &scene, lights: &lights?, log }.rows()?);
     }
     Ok(rows)
 }
@@ -78,14 +87,14 @@ struct Measurement<'a> {
     options: &'a GridOptions,
     name: &'a str,
     scene: &'a Scene,
-    lights: &'a [Lights],
+    lights: &'a [Vec<LightGeometry>],
     log: &'a dyn Fn(&str),
 }
 
 impl Measurement<'_> {
-    /// The first repeat goes from few to many and finds out what is too slow; the others take what is left in an order of
-    /// their own.
-    fn rows(&self) -> Vec<Row> {
+    /// The first repeat goes from few to many, finds out what is too slow and compares the lists; the others take what is left in an
+    /// order of their own.
+    fn rows(&self) -> Result<Vec<Row>, GridBenchError> {
         let mut rows = Vec::new();
         (self.log)(&format!("{}: repeat 0", self.name));
         let mut kept = Vec::new();
@@ -94,23 +103,39 @@ impl Measurement<'_> {
                 (self.log)(&format!("{}: left out: {}", self.name, self.describe(build)));
                 continue;
             }
-            rows.push(self.row(build, 0));
+            let (row, grid) = self.build(build, 0);
+            if let Built::Padded(thesis) = &grid {
+                self.compare(build, thesis)?;
+            }
+            rows.push(row);
             kept.push(build);
         }
         for repeat in 1..self.options.repeats.max(1) {
             (self.log)(&format!("{}: repeat {repeat}", self.name));
             let mut order: Vec<(usize, Build)> = kept.iter().copied().enumerate().collect();
             order.sort_by_key(|&(i, _)| random::bits(u64::from(repeat), i as u64));
-            rows.extend(order.into_iter().map(|(_, build)| self.row(build, repeat)));
+            rows.extend(order.into_iter().map(|(_, build)| self.build(build, repeat).0));
         }
-        rows
+        Ok(rows)
+    }
+
+    /// Builds by scattering what the thesis built, untimed, and compares all lists.
+    fn compare(&self, build: Build, thesis: &ThesisGrid) -> Result<(), GridBenchError> {
+        for builder in [SCATTER, SURFACE] {
+            let lists = self.lists(Build { builder, ..build });
+            if let Some(how) = lists.disagreement(thesis) {
+                let (scene, lights) = (self.name.to_owned(), self.lights[build.lights].len());
+                return Err(GridBenchError::Differ { scene, lights, cells: build.cells, builder, how });
+            }
+        }
+        Ok(())
     }
 
     /// All builds, by the number of tests that the thesis' needs.
     fn builds(&self) -> Vec<Build> {
         let pairs = (0..self.lights.len()).flat_map(|l| self.options.cells.iter().map(move |&c| (l, c)));
         let mut builds: Vec<Build> = pairs
-            .flat_map(|(lights, cells)| [OURS, THESIS].map(|builder| Build { builder, lights, cells }))
+            .flat_map(|(lights, cells)| BUILDERS.map(|builder| Build { builder, lights, cells }))
             .collect();
         builds.sort_by_key(|&build| self.tests(build));
         builds
@@ -118,7 +143,7 @@ impl Measurement<'_> {
 
     /// Pairs of a cell and a light.
     fn tests(&self, build: Build) -> u64 {
-        u64::from(build.cells).pow(3) * self.lights[build.lights].corners.len() as u64
+        u64::from(build.cells).pow(3) * self.lights[build.lights].len() as u64
     }
 
     /// Seconds that the thesis' build would take at the speed of the largest one so far; 0 without any.
@@ -130,67 +155,75 @@ impl Measurement<'_> {
     }
 
     fn describe(&self, build: Build) -> String {
-        let lights = self.lights[build.lights].corners.len();
+        let lights = self.lights[build.lights].len();
         format!("{} with {lights} lights and {} cells along each axis", build.builder, build.cells)
     }
 
-    fn row(&self, build: Build, repeat: u32) -> Row {
-        let lights = &self.lights[build.lights];
-        let common = Row {
+    fn build(&self, build: Build, repeat: u32) -> (Row, Built) {
+        let start = Instant::now();
+        let grid = if build.builder == THESIS {
+            Built::Padded(self.padded(build))
+        } else {
+            Built::Compact(self.lists(build))
+        };
+        let seconds = start.elapsed().as_secs_f64();
+        let row = Row {
             scene: self.name.to_owned(),
             triangles: self.scene.triangles.len() as u64,
-            lights: lights.corners.len() as u64,
+            lights: self.lights[build.lights].len() as u64,
             cells_per_axis: build.cells,
             range: self.options.range,
             builder: build.builder.to_owned(),
             repeat,
+            seconds,
+            cells: u64::from(build.cells).pow(3),
             threads: rayon::current_num_threads() as u32,
             device: processor(),
             ..Row::default()
         };
-        if build.builder == OURS { self.ours(lights, common) } else { self.thesis(lights, common) }
+        let row = match &grid {
+            Built::Padded(grid) => Row {
+                tests: self.tests(build),
+                stored_cells: row.cells,
+                entries: grid.entries(),
+                dropped: grid.overflow.dropped,
+                bytes: grid.bytes(),
+                ..row
+            },
+            Built::Compact(lists) => Row {
+                tests: lists.tests,
+                stored_cells: lists.cells.len() as u64,
+                entries: lists.entries.len() as u64,
+                dropped: lists.dropped,
+                bytes: lists.bytes(),
+                ..row
+            },
+        };
+        (row, grid)
     }
 
-    fn ours(&self, lights: &Lights, common: Row) -> Row {
-        let size = cell_size(self.scene, common.cells_per_axis);
-        let start = Instant::now();
-        let grid = light_lists(self.scene, &lights.corners, Some(size), self.options.range);
-        let seconds = start.elapsed().as_secs_f64();
-        let Some(grid) = grid else { return Row { seconds, ..common } };
-        let words = grid.cells.len() + grid.starts.len() + grid.entries.len();
-        Row {
-            seconds,
-            cells: grid.dimensions.iter().map(|&d| u64::from(d)).product(),
-            stored_cells: grid.cells.len() as u64,
-            entries: grid.entries.len() as u64,
-            bytes: (words * size_of::<u32>()) as u64,
-            ..common
-        }
-    }
-
-    fn thesis(&self, lights: &Lights, common: Row) -> Row {
-        let options =
-            ThesisOptions { range: self.options.range, list: self.options.list, grid: common.cells_per_axis };
+    fn lattice(&self, cells: u32) -> Lattice {
         let [low, high] = self.scene.bounds().unwrap_or_default().map(|p| p.as_vec3());
-        let grid = ThesisGrid::build(&lights.geometry, low, high, &options);
-        let cells = u64::from(common.cells_per_axis).pow(3);
-        Row {
-            seconds: grid.build_seconds,
-            cells,
-            stored_cells: cells,
-            entries: grid.entries(),
-            dropped: grid.overflow.dropped,
-            bytes: grid.bytes(),
-            ..common
-        }
+        Lattice::over(low, high, cells)
     }
-}
 
-/// The edge of the cubes of which `cells` cover the longest axis, metres.
-fn cell_size(scene: &Scene, cells: u32) -> f32 {
-    let extent = scene.bounds().map_or(Vec3::ONE, |[low, high]| (high - low).as_vec3()).max_element();
-    // The lattice leaves a few thousandths of a cell of room at its ends.
-    extent / (cells as f32 - 0.01)
+    fn padded(&self, build: Build) -> ThesisGrid {
+        let (range, list) = (self.options.range, self.options.list);
+        let [low, high] = self.scene.bounds().unwrap_or_default().map(|p| p.as_vec3());
+        let options = ThesisOptions { range, list, grid: build.cells };
+        ThesisGrid::build(&self.lights[build.lights], low, high, &options)
+    }
+
+    fn lists(&self, build: Build) -> LightLists {
+        let lattice = self.lattice(build.cells);
+        let lights = ActiveHemisphere::of_all(&self.lights[build.lights], self.options.range);
+        let cells = if build.builder == SURFACE {
+            StoredCells::with_surface(lattice, self.scene)
+        } else {
+            StoredCells::all(lattice)
+        };
+        scatter(&lights, &cells, self.options.list)
+    }
 }
 
 #[cfg(test)]
@@ -212,10 +245,10 @@ mod tests {
     }
 
     #[test]
-    fn every_grid_is_built_by_both_in_every_repeat() {
+    fn every_grid_is_built_by_all_in_every_repeat() {
         let rows = rows(&options());
-        assert_eq!(rows.len(), 2 * 2 * 2 * 2);
-        for builder in [OURS, THESIS] {
+        assert_eq!(rows.len(), 2 * 2 * 3 * 2);
+        for builder in BUILDERS {
             assert_eq!(rows.iter().filter(|row| row.builder == builder).count(), 8);
         }
         // Counts do not depend on the repeat.
@@ -224,28 +257,24 @@ mod tests {
                 (&other.builder, other.lights, other.cells_per_axis)
                     == (&row.builder, row.lights, row.cells_per_axis)
             };
-            assert_eq!(rows.iter().filter(same).filter(|other| other.entries == row.entries).count(), 2);
+            let alike = |other: &&Row| (other.entries, other.tests) == (row.entries, row.tests);
+            assert_eq!(rows.iter().filter(same).filter(alike).count(), 2);
         }
     }
 
     #[test]
-    fn lists_are_about_as_long_in_both() {
-        // The thesis' cells are flatter, since the room is; its lists here hold everything.
-        let rows = rows(&GridOptions { list: 1_000, ..options() });
-        for ours in rows.iter().filter(|row| row.builder == OURS) {
-            let thesis = rows.iter().find(|row| {
-                row.builder == THESIS
-                    && (row.lights, row.cells_per_axis) == (ours.lights, ours.cells_per_axis)
-            });
-            let thesis = thesis.unwrap();
-            assert_eq!(thesis.cells, u64::from(ours.cells_per_axis).pow(3));
-            assert!(ours.cells < thesis.cells && ours.stored_cells <= ours.cells);
-            assert!(ours.cells_per_axis < 8 || ours.stored_cells < ours.cells);
-            assert_eq!(thesis.dropped, 0);
-            // Cells with surface are nearer to lights than others.
-            let length = |row: &Row| row.entries as f64 / row.stored_cells as f64;
-            let ratio = length(ours) / length(thesis);
-            assert!((0.5..4.0).contains(&ratio), "{ratio}");
+    fn scattering_tests_less_and_finds_the_same() {
+        // In one repeat, all builders take the grids in the same order.
+        let rows = rows(&GridOptions { list: 1_000, repeats: 1, ..options() });
+        let of = |builder: &str| rows.iter().filter(|row| row.builder == builder).collect::<Vec<_>>();
+        for ((thesis, scatter), surface) in of(THESIS).into_iter().zip(of(SCATTER)).zip(of(SURFACE)) {
+            assert_eq!((thesis.lights, thesis.cells), (scatter.lights, scatter.cells));
+            assert_eq!(thesis.tests, thesis.lights * thesis.cells);
+            assert_eq!((thesis.dropped, thesis.entries), (0, scatter.entries));
+            assert!(surface.tests == scatter.tests && scatter.tests < thesis.tests);
+            // Four cells along an axis leave none without surface.
+            let fewer = surface.stored_cells < scatter.stored_cells && surface.entries < scatter.entries;
+            assert_eq!(fewer, surface.cells_per_axis == 8);
         }
     }
 
@@ -262,21 +291,11 @@ mod tests {
     }
 
     #[test]
-    fn the_longest_axis_has_as_many_cells_as_asked() {
-        let scene = load_scene("room", 3_000).unwrap();
-        let lights = lights("room", &scene, 100).unwrap();
-        for cells in [1, 2, 16, 33, 100, 256] {
-            let grid = light_lists(&scene, &lights.corners, Some(cell_size(&scene, cells)), 1.0).unwrap();
-            assert_eq!(grid.dimensions.into_iter().max(), Some(cells));
-        }
-    }
-
-    #[test]
     fn what_would_take_too_long_is_left_out() {
         // Whatever the machine: nothing is as fast as that, but the first build, of which nothing is known, is always done.
         let rows = rows(&GridOptions { limit: 1e-12, ..options() });
         assert_eq!(rows.iter().filter(|row| row.builder == THESIS).count(), 2);
-        assert_eq!(rows.iter().filter(|row| row.builder == OURS).count(), 8);
+        assert_eq!(rows.iter().filter(|row| row.builder == SCATTER).count(), 8);
     }
 
     #[test]

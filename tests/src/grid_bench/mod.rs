@@ -1,12 +1,15 @@
-//! Build time of the grid against lights and cells, the thesis' build beside ours.
+//! The thesis' lists of lights by cell, built in its way and by scattering: tests and seconds against lights and cells.
 //!
-//! Both builds get the same lights, the same box, the same reach and all threads. Ours ([`vlm_bake::grid`]) scatters lights into
-//! the cells that they reach and that hold surface; it finds those cells too, as part of its time. The thesis' tests every
-//! cell against every light ([`crate::thesis::ThesisGrid`]) and needs no surface. Aquotte 2017, table 5.2: 12.5 s for 100^3
-//! cells and 100,000 lights on a graphics card.
+//! All builds get the same lights, the same cells, the same reach and all threads. The thesis' tests every cell against every light
+//! ([`crate::thesis::ThesisGrid`]); [`scatter`] lets each light visit the cells that it may reach, once all cells, once those that hold
+//! visible surface, which it finds as part of its time. Where cells have a list in both, the lists are the same, and the
+//! measurement fails if not. Aquotte 2017, table 5.2: 12.5 s for 100^3 cells and 100,000 lights on a graphics card.
+//!
+//! The baker builds no such lists: its grid ([`vlm_bake::grid`]) holds probes, which rays connect with what they see.
 
 pub mod row;
 mod lights;
+mod span;
 pub mod scatter;
 mod measure;
 mod table;
@@ -47,6 +50,22 @@ pub enum GridBenchError {
         scene: String,
         /// The reason.
         error: vlm_bake::render::RenderError,
+    },
+    /// Two builds of one grid disagree.
+    #[error(
+        "{scene}, {lights} lights, {cells} cells along each axis: `{builder}` disagrees with the thesis' lists: {how}"
+    )]
+    Differ {
+        /// The scene's name.
+        scene: String,
+        /// Lights in the grid.
+        lights: usize,
+        /// Cells along every axis.
+        cells: u32,
+        /// The build.
+        builder: &'static str,
+        /// Where.
+        how: String,
     },
     /// The samples cannot be written.
     #[error("{path}: {source}", path = path.display())]

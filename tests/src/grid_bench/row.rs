@@ -2,11 +2,17 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Name of our build.
-pub const OURS: &str = "ours";
-
-/// Name of the thesis' build.
+/// The thesis' build: every cell tests every light.
 pub const THESIS: &str = "thesis";
+
+/// The same lists, by lights that visit the cells that they may reach.
+pub const SCATTER: &str = "scatter";
+
+/// The same, for cells that hold visible surface alone.
+pub const SURFACE: &str = "scatter to surface";
+
+/// All builds.
+pub const BUILDERS: [&str; 3] = [THESIS, SCATTER, SURFACE];
 
 /// One sample. Every repeat is a row of its own.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -17,16 +23,18 @@ pub struct Row {
     pub triangles: u64,
     /// Lights in the grid.
     pub lights: u64,
-    /// Cells along the longest axis; ours are cubes, the thesis has this many along every axis.
+    /// Cells along every axis.
     pub cells_per_axis: u32,
     /// Reach of a light over its radius.
     pub range: f32,
-    /// [`OURS`] or [`THESIS`].
+    /// One of [`BUILDERS`].
     pub builder: String,
     /// Number of the interleaved repeat, from 0.
     pub repeat: u32,
     /// Wall time of the build, seconds.
     pub seconds: f64,
+    /// Pairs of a cell and a light that were tested, and rows of cells that were left out as a whole.
+    pub tests: u64,
     /// Cells of the box.
     pub cells: u64,
     /// Cells that have a list.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::measure::GridOptions;
-use super::row::{OURS, Row, THESIS};
+use super::row::{BUILDERS, Row, THESIS};
 use crate::pareto::curves::Spread;
 use crate::pareto::numbers::{short, time};
 use crate::slope::exponent;
@@ -16,11 +16,10 @@ pub fn summary(rows: &[Row], options: &GridOptions) -> String {
     if let Some(row) = rows.first() {
         text += &format!(
             "{}, {} threads; medians of {} interleaved repeats; a light reaches {} of its radii.\n\
-             Cells are counted along the longest axis; `ours` are cubes, `thesis` divides every axis alike.\n\
-             `ours` scatters lights into the cells that hold surface, and finds these; `thesis` tests every cell against \
-             every light, with lists of {}. \
-             Both on this processor. For scale: Aquotte 2017, table 5.2, needs 12.5 s for 100^3 cells and 100,000 \
-             lights on a graphics card.\n",
+             `thesis` tests every cell against every light; `scatter` lets each light visit the rows of cells that it may reach; \
+             `scatter to surface` does so for cells that hold surface, and finds these. All keep the first {} lights of a cell. \
+             Lists were compared with the thesis', cell by cell, and are the same. \
+             For scale: Aquotte 2017, table 5.2, needs 12.5 s for 100^3 cells and 100,000 lights on a graphics card.\n",
             row.device,
             row.threads,
             repeats(rows),
@@ -62,17 +61,10 @@ fn scene_tables(scene: &str, rows: &[Row], limit: f64) -> String {
         "\n## {scene}\n\nSurface: {} triangles. Lights: {from}.\n\n",
         grouped(rows.first().map_or(0, |row| row.triangles))
     );
-    let header = |first: &str| -> Vec<String> {
-        std::iter::once(first.to_owned()).chain(cells.iter().map(|c| format!("{c} per axis"))).collect()
-    };
-    let times = lights.iter().map(|&l| {
-        let cell = |&c: &u32| times(rows, l, c);
-        std::iter::once(grouped(l)).chain(cells.iter().map(cell)).collect()
-    });
-    let counts =
-        std::iter::once("cells: ours; thesis".to_owned()).chain(cells.iter().map(|&c| counts(rows, c)));
-    let lines: Vec<Vec<String>> = std::iter::once(counts.collect()).chain(times).collect();
-    text += &table(&header("lights: ours, thesis (ratio)"), &lines);
+    let pairs = || lights.iter().flat_map(|&l| cells.iter().map(move |&c| (l, c)));
+    let header = ["lights", "cells", "build", "tests", "fewer", "time", "faster"].map(str::to_owned);
+    let lines = pairs().flat_map(|(l, c)| BUILDERS.map(|builder| compared(rows, builder, l, c)));
+    text += &table(&header, &lines.collect::<Vec<_>>());
     if rows.iter().any(|row| seconds(rows, THESIS, row.lights, row.cells_per_axis).is_none()) {
         text += &format!(
             "\n*not run*: at its speed in this run, tests a second, the thesis' build would take longer than {} s.\n",
@@ -81,33 +73,21 @@ fn scene_tables(scene: &str, rows: &[Row], limit: f64) -> String {
     }
     text += &spread_line(rows);
     text += "\nExponent of the time by number of lights:\n\n";
-    let slopes = [OURS, THESIS].map(|builder| {
+    let header: Vec<String> =
+        std::iter::once("build".to_owned()).chain(cells.iter().map(|c| format!("{c}^3 cells"))).collect();
+    let slopes = BUILDERS.map(|builder| {
         let of = |&c: &u32| {
             slope(lights.iter().filter_map(|&l| Some((l as f64, seconds(rows, builder, l, c)?.median))))
         };
         std::iter::once(builder.to_owned()).chain(cells.iter().map(of)).collect()
     });
-    text += &table(&header("build"), &slopes);
+    text += &table(&header, &slopes);
     text += "\nWhat is stored:\n\n";
     text + &stored(rows, &lights, &cells)
 }
 
 fn slope(points: impl Iterator<Item = (f64, f64)>) -> String {
     exponent(points).map_or_else(|| "-".to_owned(), |p| format!("{p:.2}"))
-}
-
-/// Cells of both builds' boxes: ours are cubes, and so fewer along the shorter axes.
-fn counts(rows: &[Row], cells: u32) -> String {
-    let of = |builder: &str| {
-        let of_builder = rows.iter().filter(|row| row.builder == builder && row.cells_per_axis == cells);
-        let found: BTreeSet<u64> = of_builder.map(|row| row.cells).collect();
-        match (found.first(), found.last()) {
-            (Some(least), Some(most)) if least < most => format!("{} to {}", grouped(*least), grouped(*most)),
-            (Some(count), _) => grouped(*count),
-            _ => "*not run*".to_owned(),
-        }
-    };
-    format!("{}; {}", of(OURS), of(THESIS))
 }
 
 /// Time of one build over its repeats.
@@ -117,17 +97,29 @@ pub(super) fn seconds(rows: &[Row], builder: &str, lights: u64, cells: u32) -> O
     Spread::of(of.map(|row| row.seconds))
 }
 
-fn times(rows: &[Row], lights: u64, cells: u32) -> String {
-    let Some(ours) = seconds(rows, OURS, lights, cells) else { return "-".to_owned() };
-    match seconds(rows, THESIS, lights, cells) {
-        Some(thesis) => format!(
-            "{}, {} ({} x)",
-            time(ours.median),
-            time(thesis.median),
-            short(thesis.median / ours.median)
-        ),
-        None => format!("{}, *not run*", time(ours.median)),
-    }
+/// A build's tests and median time, and how many times less than the thesis' they are.
+fn compared(rows: &[Row], builder: &str, lights: u64, cells: u32) -> Vec<String> {
+    let row = first(rows, builder, lights, cells);
+    let median = |builder: &str| seconds(rows, builder, lights, cells).map(|spread| spread.median);
+    let all = lights * u64::from(cells).pow(3);
+    let tests = row.map(|row| row.tests);
+    let fewer = tests.filter(|_| builder != THESIS).map(|tests| all as f64 / tests.max(1) as f64);
+    let faster = median(THESIS).zip(median(builder)).filter(|_| builder != THESIS).map(|(a, b)| a / b);
+    let times = |ratio: Option<f64>| ratio.map_or_else(|| "-".to_owned(), |ratio| short(ratio) + " x");
+    vec![
+        grouped(lights),
+        format!("{cells}^3"),
+        builder.to_owned(),
+        grouped(tests.unwrap_or(all)),
+        times(fewer),
+        median(builder).map_or_else(|| "*not run*".to_owned(), time),
+        times(faster),
+    ]
+}
+
+/// The first sample of a build.
+fn first<'a>(rows: &'a [Row], builder: &str, lights: u64, cells: u32) -> Option<&'a Row> {
+    rows.iter().find(|row| (row.builder.as_str(), row.lights, row.cells_per_axis) == (builder, lights, cells))
 }
 
 /// How far repeats differ: the greatest over the least time of a build.
@@ -144,25 +136,10 @@ fn spread_line(rows: &[Row]) -> String {
 }
 
 fn stored(rows: &[Row], lights: &BTreeSet<u64>, cells: &BTreeSet<u32>) -> String {
-    let header = [
-        "lights",
-        "per axis",
-        "build",
-        "cells",
-        "stored cells",
-        "entries",
-        "a stored cell",
-        "dropped",
-        "bytes",
-    ];
+    let header = ["lights", "cells", "build", "stored cells", "entries", "a stored cell", "dropped", "bytes"];
     let mut lines = Vec::new();
     for (&l, &c) in lights.iter().flat_map(|l| cells.iter().map(move |c| (l, c))) {
-        for builder in [OURS, THESIS] {
-            let found = rows
-                .iter()
-                .find(|row| (row.builder.as_str(), row.lights, row.cells_per_axis) == (builder, l, c));
-            lines.extend(found.map(stored_line));
-        }
+        lines.extend(BUILDERS.iter().filter_map(|builder| first(rows, builder, l, c)).map(stored_line));
     }
     table(&header.map(str::to_owned), &lines)
 }
@@ -170,9 +147,8 @@ fn stored(rows: &[Row], lights: &BTreeSet<u64>, cells: &BTreeSet<u32>) -> String
 fn stored_line(row: &Row) -> Vec<String> {
     vec![
         grouped(row.lights),
-        row.cells_per_axis.to_string(),
+        format!("{}^3", row.cells_per_axis),
         row.builder.clone(),
-        grouped(row.cells),
         grouped(row.stored_cells),
         grouped(row.entries),
         short(row.entries as f64 / row.stored_cells.max(1) as f64),
@@ -183,15 +159,19 @@ fn stored_line(row: &Row) -> Vec<String> {
 
 #[cfg(test)]
 pub(super) mod tests {
+    use super::super::row::{SCATTER, SURFACE};
     use super::*;
 
-    /// Ours grows with the lights, the thesis' with lights x cells; repeats differ by 10 %; the largest was not run.
+    /// Scattering grows with the lights, the thesis' with lights x cells; repeats differ by 10 %; the largest was not run.
     pub fn made_up() -> Vec<Row> {
         let mut rows = Vec::new();
         for (lights, cells) in [(1_000u64, 16u32), (1_000, 32), (10_000, 16), (10_000, 32)] {
-            for (builder, seconds) in
-                [(OURS, 2e-6 * lights as f64), (THESIS, 4e-9 * lights as f64 * f64::from(cells).powi(3))]
-            {
+            let all = lights * u64::from(cells).pow(3);
+            for (builder, tests, seconds) in [
+                (THESIS, all, 4e-9 * all as f64),
+                (SCATTER, 100 * lights, 2e-6 * lights as f64),
+                (SURFACE, 10 * lights, 1e-6 * lights as f64),
+            ] {
                 if builder == THESIS && lights * u64::from(cells) > 200_000 {
                     continue;
                 }
@@ -200,12 +180,12 @@ pub(super) mod tests {
                     triangles: 12_345,
                     lights,
                     cells_per_axis: cells,
-                    range: 8.0,
+                    range: 4.5,
                     builder: builder.to_owned(),
                     repeat,
                     seconds: seconds * factor,
-                    // A room half as high as wide, where cells are cubes.
-                    cells: u64::from(cells).pow(3) / if builder == OURS { 2 } else { 1 },
+                    tests,
+                    cells: u64::from(cells).pow(3),
                     stored_cells: 500,
                     entries: 40 * lights,
                     bytes: 1_500_000,
@@ -222,12 +202,14 @@ pub(super) mod tests {
     fn tables_hold_medians_ratios_and_slopes() {
         let text = summary(&made_up(), &GridOptions::default());
         for line in [
-            "| 1,000 | 2.00 ms, 16.4 ms (8.19 x) | 2.00 ms, 131 ms (65.5 x) |",
-            "| 10,000 | 20.0 ms, 164 ms (8.19 x) | 20.0 ms, *not run* |",
-            "| ours | 1.00 | 1.00 |",
+            "| 1,000 | 16^3 | thesis | 4,096,000 | - | 16.4 ms | - |",
+            "| 1,000 | 16^3 | scatter | 100,000 | 41.0 x | 2.00 ms | 8.19 x |",
+            "| 1,000 | 16^3 | scatter to surface | 10,000 | 410 x | 1.00 ms | 16.4 x |",
+            "| 10,000 | 32^3 | thesis | 327,680,000 | - | *not run* | - |",
+            "| 10,000 | 32^3 | scatter | 1,000,000 | 328 x | 20.0 ms | - |",
+            "| scatter | 1.00 | 1.00 |",
             "| thesis | 1.00 | - |",
-            "| cells: ours; thesis | 2,048; 4,096 | 16,384; 32,768 |",
-            "| 1,000 | 16 | ours | 2,048 | 500 | 40,000 | 80.0 | 0 | 1.5 MB |",
+            "| 1,000 | 16^3 | scatter | 500 | 40,000 | 80.0 | 0 | 1.5 MB |",
             "longer than 20.0 s",
             "1.22 in the median, 1.22 at worst",
             "medians of 3 interleaved repeats",

@@ -44,7 +44,8 @@ fn walls(trace: &TraceScene, position: Vec3, reach: f32) -> Vec<Vec3> {
     walls
 }
 
-/// Least and largest corner of a box around 0 that holds none of these points, nearest first: each cuts the side on whose axis it is farthest.
+/// Least and largest corner of a box around 0 that holds none of these points, nearest first: each cuts the side on whose axis it is
+/// farthest.
 fn free_box(walls: impl IntoIterator<Item = Vec3>, reach: f32) -> [Vec3; 2] {
     let (mut low, mut high) = (Vec3::splat(-reach), Vec3::splat(reach));
     for wall in walls {

@@ -1,7 +1,7 @@
 //! The rows of probes in free space: in which share of all directions each source lies, by rays.
 //!
-//! A frame knows of a source no more than its middle. Close by, light does not come from there: so the shares are weighed anew, as little as
-//! it takes for light of all sources alike to come from where the rays met them, up to the second band of spherical harmonics.
+//! A frame knows of a source no more than its middle. Close by, light does not come from there: so the shares are weighed anew, as little
+//! as it takes for light of all sources alike to come from where the rays met them, up to the second band of spherical harmonics.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -15,7 +15,8 @@ use crate::reference::directions_around;
 /// How often shares are weighed anew: a source's bands fade with its share.
 const ROUNDS: usize = 4;
 
-/// No share becomes smaller or larger than this, relative to what it was. Wider limits follow directions more closely and let some sources count for others.
+/// No share becomes smaller or larger than this, relative to what it was. Wider limits follow directions more closely and let some sources
+/// count for others.
 const CHANGE: [f32; 2] = [0.1, 10.0];
 
 /// Added to the diagonal of the equations, which sources in one plane leave without a solution.

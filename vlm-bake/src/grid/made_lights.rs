@@ -16,7 +16,8 @@ const LOOKS: u32 = 8;
 /// Lights whose form factor is below this are too faint to be looked for.
 const LEAST_FORM_FACTOR: f32 = 1e-5;
 
-/// Surface hides nothing of a light up to this many times as far from it as the light lies behind it: seen aslant or across a bend it may be farther.
+/// Surface hides nothing of a light up to this many times as far from it as the light lies behind it: seen aslant or across a bend it may
+/// be farther.
 const DEPTH: f32 = 1.5;
 
 /// A light lies behind a sheet, which has no inside, where that is nearer than this share of the light's longest edge.

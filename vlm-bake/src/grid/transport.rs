@@ -17,8 +17,8 @@ pub type Row = Vec<(u32, f32)>;
 /// shadows on far surface more closely, and make rows longer.
 const WHOLE: f32 = 0.2;
 
-/// The rows of places, each from `rays` directions. The surface in each direction is a source's, so a row knows what is hidden from its place,
-/// and its sum is the share of directions that meet surface.
+/// The rows of places, each from `rays` directions. The surface in each direction is a source's, so a row knows what is hidden from its
+/// place, and its sum is the share of directions that meet surface.
 #[must_use]
 pub fn rows(input: &GridInput, places: &[Place], rays: u32, progress: &dyn Progress) -> Vec<Row> {
     let made = made_lights::made_lights(input);

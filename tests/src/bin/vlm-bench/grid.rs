@@ -1,4 +1,4 @@
-//! `vlm-bench grid`: build time of the grid, ours and the thesis'.
+//! `vlm-bench grid`: lists of lights by cell, built in the thesis' way and by scattering.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -19,12 +19,12 @@ pub struct GridArgs {
     #[arg(long, value_name = "NS", value_delimiter = ',', default_value = "1000,3000,10000,30000,100000",
         value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     lights: Vec<u32>,
-    /// Cells along the longest axis, separated by commas
+    /// Cells along every axis, separated by commas
     #[arg(long, value_name = "NS", value_delimiter = ',', default_value = "16,32,64,100",
         value_parser = clap::value_parser!(u32).range(1..=256))]
     cells: Vec<u32>,
-    /// Reach of a light over its own radius; 8 is what the preset `game` bakes
-    #[arg(long, value_name = "R", default_value_t = 8.0, value_parser = positive)]
+    /// Reach of a light over its own radius
+    #[arg(long, value_name = "R", default_value_t = 4.5, value_parser = positive)]
     range: f64,
     /// Thesis: entries of each cell's list
     #[arg(long, value_name = "K", default_value_t = 128, value_parser = clap::value_parser!(u32).range(1..))]
@@ -51,7 +51,7 @@ fn positive(text: &str) -> Result<f64, String> {
 /// Runs the command.
 ///
 /// # Errors
-/// For scenes that cannot be had, and files that cannot be written.
+/// For scenes that cannot be had, builds that disagree, and files that cannot be written.
 pub fn run(args: &GridArgs) -> Result<(), Box<dyn Error>> {
     let options = GridOptions {
         scenes: args.scenes.clone().unwrap_or_else(default_scenes),
