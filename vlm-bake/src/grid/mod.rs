@@ -21,6 +21,7 @@ mod reach;
 mod refine;
 mod spacing;
 mod stand_in;
+mod steps;
 mod transport;
 mod tree;
 mod uncovered;

@@ -6,6 +6,7 @@ use vlm_format::Probe;
 
 use super::pool::Place;
 use super::spacing::Spacing;
+use super::steps::steps;
 use crate::shade::TraceScene;
 
 /// Reach along the surface over the spacing. Higher values blend more probes, which smooths their noise and blurs borders.
@@ -15,7 +16,7 @@ const REACH: f32 = 1.45;
 const HEIGHT: f32 = 0.5;
 
 /// Rays along the surface.
-const AROUND: u32 = 32;
+pub(super) const AROUND: u32 = 32;
 
 /// They run at this height, over the reach. Lower ones are stopped by smaller steps.
 const LIFT: f32 = 0.12;
@@ -36,7 +37,12 @@ pub fn probes(trace: &TraceScene, pool: &[Place], spacing: &Spacing, chosen: &[u
 fn probe(trace: &TraceScene, place: &Place, reach: f32) -> Probe {
     let surface = &place.surface;
     let normal = surface.normal;
-    let walls = walls(trace, place, reach);
+    let height = HEIGHT * reach;
+    let up = free(trace, surface.position, surface.geometric_normal, height);
+    let down = free(trace, surface.position, -surface.geometric_normal, height);
+    let mut walls = walls(trace, place, reach);
+    walls.extend(steps(trace, place, reach, [0.9 * up, height]));
+    walls.sort_by(|a, b| a.distance.total_cmp(&b.distance));
     let tangent = walls.first().map_or_else(
         || normal.any_orthonormal_vector(),
         |wall| {
@@ -51,10 +57,7 @@ fn probe(trace: &TraceScene, place: &Place, reach: f32) -> Probe {
         let side = &mut sides[axis + usize::from(along > 0.0)];
         *side = side.min(along.abs());
     }
-    let height = HEIGHT * reach;
     let least = LEAST * reach;
-    let up = free(trace, surface.position, surface.geometric_normal, height);
-    let down = free(trace, surface.position, -surface.geometric_normal, height);
     Probe {
         position: surface.position,
         row_scale: 0.0,
@@ -67,31 +70,30 @@ fn probe(trace: &TraceScene, place: &Place, reach: f32) -> Probe {
 }
 
 /// What stands in a probe's way along its surface.
-struct Wall {
+pub(super) struct Wall {
     /// From the probe, metres.
-    at: Vec3,
+    pub distance: f32,
+    /// Likewise, as a vector.
+    pub at: Vec3,
     /// The wall's normal.
-    facing: Vec3,
+    pub facing: Vec3,
 }
 
-/// The walls within reach, nearest first.
+/// The walls within reach.
 fn walls(trace: &TraceScene, place: &Place, reach: f32) -> Vec<Wall> {
     let surface = &place.surface;
     let (u, v) = surface.geometric_normal.any_orthonormal_pair();
     let lift = free(trace, surface.position, surface.geometric_normal, LIFT * reach) * 0.9;
     let origin =
         trace.bvh.leave(surface.position + surface.geometric_normal * lift, surface.geometric_normal);
-    let mut walls: Vec<(f32, Wall)> = (0..AROUND)
-        .filter_map(|i| {
-            let (sin, cos) = (std::f32::consts::TAU * (i as f32 + 0.5) / AROUND as f32).sin_cos();
-            let direction = u * cos + v * sin;
-            let hit = trace.path_hit_within(origin, direction, reach * std::f32::consts::SQRT_2)?;
-            let facing = trace.surface(&hit, 0.0)?.geometric_normal;
-            Some((hit.distance, Wall { at: direction * hit.distance, facing }))
-        })
-        .collect();
-    walls.sort_by(|a, b| a.0.total_cmp(&b.0));
-    walls.into_iter().map(|(_, wall)| wall).collect()
+    let wall = |i: u32| {
+        let (sin, cos) = (std::f32::consts::TAU * (i as f32 + 0.5) / AROUND as f32).sin_cos();
+        let direction = u * cos + v * sin;
+        let hit = trace.path_hit_within(origin, direction, reach * std::f32::consts::SQRT_2)?;
+        let facing = trace.surface(&hit, 0.0)?.geometric_normal;
+        Some(Wall { distance: hit.distance, at: direction * hit.distance, facing })
+    };
+    (0..AROUND).filter_map(wall).collect()
 }
 
 /// How far one comes from a surface along a direction, at most `most`.
