@@ -10,6 +10,7 @@ pub mod metrics;
 pub mod gpu;
 pub mod form_factor;
 pub mod grid_gpu;
+pub mod runtime_gpu;
 pub mod thesis;
 pub mod plot;
 pub mod random;
