@@ -5,7 +5,7 @@ use vlm_shaders::cpu::punctual::PunctualLight;
 use vlm_shaders::wgsl;
 use wgpu::{BindGroup, BindGroupLayout, Buffer, CommandEncoder, ComputePipeline, Device, Queue};
 
-use crate::error::{Error, within};
+use crate::error::Error;
 use crate::pass::{self, Buffers, dispatch, group, layout, storage, uniform, workgroups};
 use crate::upload::{MOST_REAL_LIGHTS, Uploaded};
 
@@ -58,17 +58,10 @@ impl Direct {
         Ok(Self { header, lights, spans, visibility, points, irradiance, group, point_count, workgroups: 0 })
     }
 
-    /// Writes the real lights; bytes written.
-    pub(crate) fn write_lights(&self, queue: &Queue, lights: &[PunctualLight]) -> Result<u64, Error> {
-        let count = lights.len() as u64;
-        within(
-            "the frame (real lights)",
-            "vlm_runtime::MOST_REAL_LIGHTS",
-            count,
-            u64::from(MOST_REAL_LIGHTS),
-        )?;
+    /// Writes the real lights, no more than [`MOST_REAL_LIGHTS`]; bytes written.
+    pub(crate) fn write_lights(&self, queue: &Queue, lights: &[PunctualLight]) -> u64 {
         let packed: Vec<PackedLight> = lights.iter().map(PackedLight::from).collect();
-        Ok(write(queue, &self.lights, 0, &packed))
+        write(queue, &self.lights, 0, &packed)
     }
 
     /// Writes the visibility of the lights of these numbers; bytes written.

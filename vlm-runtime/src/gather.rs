@@ -70,15 +70,19 @@ impl Gather {
         device: &Device,
         common: &BindGroup,
         targets: &Targets<'_>,
-    ) -> Result<(), Error> {
-        let [width, height] = check(targets, self.format, device)?;
+    ) {
+        let [width, height] = size(targets.irradiance);
         if let Some(pairs) = &self.pair_count {
             encoder.clear_buffer(pairs, 0, None);
         }
         let group = self.bind(device, targets);
         let tiles = [width.div_ceil(TILE), height.div_ceil(TILE)];
         dispatch(encoder, "gather", &self.pipeline, &[common, &self.scene_group, &group], tiles);
-        Ok(())
+    }
+
+    /// Every texture has the size of the irradiance and a format that can be read.
+    pub(crate) fn check(&self, targets: &Targets<'_>, device: &Device) -> Result<(), Error> {
+        check(targets, self.format, device)
     }
 
     fn bind(&self, device: &Device, targets: &Targets<'_>) -> BindGroup {
@@ -160,9 +164,7 @@ fn untagged(device: &Device) -> TextureView {
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
-/// Every texture has the size of the irradiance and a format that can be read; the size in pixels.
-fn check(targets: &Targets<'_>, written: TextureFormat, device: &Device) -> Result<[u32; 2], Error> {
-    let size = |view: &TextureView| [view.texture().width(), view.texture().height()];
+fn check(targets: &Targets<'_>, written: TextureFormat, device: &Device) -> Result<(), Error> {
     let expected = size(targets.irradiance);
     let format = targets.irradiance.texture().format();
     if format != written {
@@ -185,8 +187,11 @@ fn check(targets: &Targets<'_>, written: TextureFormat, device: &Device) -> Resu
     }
     let limit = u64::from(device.limits().max_compute_workgroups_per_dimension) * u64::from(TILE);
     let longest = u64::from(expected[0].max(expected[1]));
-    within("the picture (pixels of a side)", "max_compute_workgroups_per_dimension", longest, limit)?;
-    Ok(expected)
+    within("the picture (pixels of a side)", "max_compute_workgroups_per_dimension", longest, limit)
+}
+
+fn size(view: &TextureView) -> [u32; 2] {
+    [view.texture().width(), view.texture().height()]
 }
 
 fn check_format(what: &'static str, view: &TextureView) -> Result<(), Error> {

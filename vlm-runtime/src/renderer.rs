@@ -20,7 +20,7 @@ use crate::load::{VlmAsset, world_lights};
 use crate::pass::{Buffers, group, layout, storage, uniform};
 use crate::refresh::Refresh;
 use crate::stats::FrameStats;
-use crate::upload::{Host, Uploaded, check_listed, list_words};
+use crate::upload::{Host, Uploaded, check_listed, check_real_lights, list_words};
 
 /// Finds the indirect light of frames, on one device.
 ///
@@ -158,9 +158,10 @@ impl VlmRenderer {
         encoder: &mut CommandEncoder,
         targets: &Targets<'_>,
     ) -> Result<FrameStats, Error> {
+        self.loaded()?.gather.check(targets, &self.device)?;
         let mut stats = self.record_light(encoder)?;
         let loaded = self.loaded.as_ref().ok_or(Error::NotLoaded)?;
-        loaded.gather.record(encoder, &self.device, &loaded.common, targets)?;
+        loaded.gather.record(encoder, &self.device, &loaded.common, targets);
         stats.passes.push("gather");
         Ok(stats)
     }
@@ -274,6 +275,7 @@ impl VlmRenderer {
 impl Loaded {
     fn check(&self, frame: &Frame<'_>, moving_nodes: bool) -> Result<(), Error> {
         check_finite(frame)?;
+        check_real_lights(frame.lights.len())?;
         let (lights, points) = (frame.lights.len(), self.host.points.len());
         let found = match frame.visibility {
             Visibility::Given(visibility) => Some(visibility.len()),
@@ -302,7 +304,7 @@ impl Loaded {
     ) -> Result<u64, Error> {
         let mut bytes = 0;
         if self.changes.light(frame.lights) {
-            bytes += self.direct.write_lights(queue, frame.lights)?;
+            bytes += self.direct.write_lights(queue, frame.lights);
         }
         if let Visibility::Given(visibility) = frame.visibility {
             let changed = self.changes.see(visibility);

@@ -126,3 +126,9 @@ pub(crate) fn check_listed(count: usize) -> Result<(), Error> {
     let what = "summing every light at every pixel (lights)";
     within(what, "vlm_runtime::MOST_LISTED", count as u64, u64::from(MOST_LISTED))
 }
+
+/// An error where a frame has too many real lights.
+pub(crate) fn check_real_lights(count: usize) -> Result<(), Error> {
+    let limit = u64::from(MOST_REAL_LIGHTS);
+    within("the frame (real lights)", "vlm_runtime::MOST_REAL_LIGHTS", count as u64, limit)
+}
