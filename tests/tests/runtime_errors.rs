@@ -122,6 +122,30 @@ fn frames() {
     assert!(matches!(error, Err(Error::UnknownNode { node: 77 })), "{error:?}");
 }
 
+/// A refused frame leaves nothing half taken: the next one writes what it would have written.
+#[test]
+#[cfg_attr(not(has_vulkan), ignore = "no Vulkan driver")]
+fn visibility_too_large_for_the_device() {
+    let points = 70_000;
+    let mut data = asset().data().clone();
+    data.grid = None;
+    data.samples = vec![data.samples[0]; points];
+    data.sample_starts = vec![0; data.triangles.len()];
+    data.sample_starts.push(points as u32);
+    let mut host = Host::new(&VlmAsset::new(data, Vec::new()), Settings::default()).unwrap();
+    let suns = vec![PunctualLight::directional(-Vec3::Y, Vec3::ONE); MOST_REAL_LIGHTS as usize];
+    let seen = vec![0.5; suns.len() * points];
+    let frame = Frame { lights: &suns, visibility: Visibility::Given(&seen), ..Frame::default() };
+    let error = host.renderer.prepare(&host.queue, &frame).unwrap_err();
+    assert!(matches!(&error, Error::Limit { what, .. } if what.contains("visibility")), "{error:?}");
+    let fewer =
+        Frame { lights: &suns[..1], visibility: Visibility::Given(&seen[..points]), ..Frame::default() };
+    host.renderer.prepare(&host.queue, &fewer).unwrap();
+    let mut encoder = host.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let stats = host.renderer.record_light(&mut encoder).unwrap();
+    assert!(stats.bytes_uploaded > 4 * points as u64 && stats.passes[..1] == ["direct"], "{stats:?}");
+}
+
 #[test]
 #[cfg_attr(not(has_vulkan), ignore = "no Vulkan driver")]
 fn textures() {

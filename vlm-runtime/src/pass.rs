@@ -132,7 +132,8 @@ impl Buffers<'_> {
         Ok(self.device.create_buffer(&descriptor))
     }
 
-    fn check(&self, label: &str, size: u64) -> Result<(), Error> {
+    /// An error where a buffer of this size would not fit.
+    pub(crate) fn check(&self, label: &str, size: u64) -> Result<(), Error> {
         let limits = self.device.limits();
         let what = format!("the buffer `{label}` (bytes)");
         within(&what, "max_buffer_size", size, limits.max_buffer_size)?;

@@ -139,8 +139,11 @@ impl VlmRenderer {
     pub fn prepare(&mut self, queue: &Queue, frame: &Frame<'_>) -> Result<(), Error> {
         let moving_nodes = self.settings.moving_nodes;
         let loaded = self.loaded.as_mut().ok_or(Error::NotLoaded)?;
-        loaded.check(frame, moving_nodes)?;
         let buffers = Buffers { device: &self.device, bytes: 0 };
+        loaded.check(frame, moving_nodes)?;
+        if let Visibility::Given(visibility) = frame.visibility {
+            buffers.check("visibility", size_of_val(visibility) as u64)?;
+        }
         let mut bytes = loaded.move_nodes(queue, frame.moved)?;
         bytes += loaded.write_direct(queue, (&buffers, &self.direct), frame)?;
         bytes += loaded.gather.write_view(queue, frame.view);
