@@ -40,8 +40,8 @@ pub struct GridHeader {
     pub sample_count: u32,
     /// Number of pieces of surface without a light.
     pub uncovered_count: u32,
-    /// Not used.
-    pub padding: u32,
+    /// Of [`LightSet::tags`].
+    pub light_tags: u32,
 }
 
 /// What a light emits by itself, and the radiosity of the surface that it stands for over its own. 16 bytes.
@@ -91,7 +91,7 @@ impl GridTables {
             light_count: lights.len() as u32,
             sample_count: lights.samples.len() as u32,
             uncovered_count: grid.uncovered.len() as u32,
-            padding: 0,
+            light_tags: append(&lights.tags),
         };
         let surface = |light| LightSurface {
             emission: lights.emission.get(light).copied().unwrap_or_default(),
@@ -121,6 +121,7 @@ mod tests {
         let lights = LightSet {
             geometry: vec![Default::default()],
             sample_starts: vec![60, 61],
+            tags: vec![70],
             ..LightSet::default()
         };
         let GridTables { header, indices, light_surfaces } = GridTables::new(&grid, &lights);
@@ -132,9 +133,10 @@ mod tests {
             header.near,
             header.row_starts,
             header.sample_starts,
+            header.light_tags,
         ];
-        assert_eq!(lists.map(at), [10, 20, 30, 40, 50, 60]);
-        assert_eq!((indices[..3].to_vec(), indices.len()), (grid.cells, 17));
+        assert_eq!(lists.map(at), [10, 20, 30, 40, 50, 60, 70]);
+        assert_eq!((indices[..3].to_vec(), indices.len()), (grid.cells, 18));
         assert_eq!(light_surfaces[0].gain, 2.0);
     }
 }

@@ -15,8 +15,10 @@ pub const BLEND: &str = include_str!("../wgsl/shared/blend.wgsl");
 /// A probe's far light; after [`BLEND`].
 pub const FAR: &str = include_str!("../wgsl/shared/far.wgsl");
 
-/// The function `gather_static` with its bindings, for shaders that light pixels; after [`FORM_FACTOR`], [`GRID`], [`BLEND`] and
-/// [`FAR`].
+/// What phase 2 reads of the lights; after [`FORM_FACTOR`].
+pub const LIGHTS: &str = include_str!("../wgsl/shared/lights.wgsl");
+
+/// The function `gather_static` with its bindings, for shaders that light pixels; after [`LIGHTS`], [`GRID`], [`BLEND`] and [`FAR`].
 pub const GATHER_STATIC: &str = include_str!("../wgsl/shared/gather_static.wgsl");
 
 /// The rows of probes; after [`GRID`].
@@ -44,6 +46,12 @@ pub fn form_factor_sums() -> String {
     format!("{FORM_FACTOR}\n{RECEIVERS}\n{}", include_str!("../wgsl/form_factor_sums.wgsl"))
 }
 
+/// The direct light at the points that phase 1 lights; entry point `direct`, 64 invocations per workgroup, one per span of points.
+#[must_use]
+pub fn direct() -> String {
+    format!("{}\n{}", include_str!("../wgsl/shared/punctual.wgsl"), include_str!("../wgsl/direct.wgsl"))
+}
+
 /// Phase 1: the radiosity of lights and sources; entry point `inject`, 64 invocations per workgroup, one per light and one per piece
 /// of surface without one.
 #[must_use]
@@ -67,7 +75,7 @@ pub fn refresh_free() -> String {
 #[must_use]
 pub fn gather_static() -> String {
     let receivers = include_str!("../wgsl/gather_static.wgsl");
-    format!("{FORM_FACTOR}\n{GRID}\n{BLEND}\n{FAR}\n{GATHER_STATIC}\n{RECEIVER}\n{receivers}")
+    format!("{FORM_FACTOR}\n{LIGHTS}\n{GRID}\n{BLEND}\n{FAR}\n{GATHER_STATIC}\n{RECEIVER}\n{receivers}")
 }
 
 /// Phase 2 at a list of receivers that move; entry point `gather_moving`, 64 invocations per workgroup, one per receiver.
@@ -75,19 +83,107 @@ pub fn gather_static() -> String {
 pub fn gather_free() -> String {
     let receivers = include_str!("../wgsl/gather_free.wgsl");
     let gather = format!("{GATHER_STATIC}\n{FREE_LIGHT}\n{GATHER_FREE}");
-    format!("{FORM_FACTOR}\n{GRID}\n{BLEND}\n{FAR}\n{gather}\n{RECEIVER}\n{receivers}")
+    format!("{FORM_FACTOR}\n{LIGHTS}\n{GRID}\n{BLEND}\n{FAR}\n{gather}\n{RECEIVER}\n{receivers}")
+}
+
+/// What the gathering of an asset needs, so that shaders hold nothing for what it lacks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Gathering {
+    /// Light comes through the static grid.
+    pub grid: bool,
+    /// A list of lights is summed at every point: all of them without a grid, those that moved with one.
+    pub listed: bool,
+    /// Listed lights may have tags.
+    pub tags: bool,
+}
+
+impl Gathering {
+    /// All that there are.
+    pub const ALL: [Self; 5] = [
+        Self { grid: true, listed: false, tags: false },
+        Self { grid: false, listed: true, tags: false },
+        Self { grid: false, listed: true, tags: true },
+        Self { grid: true, listed: true, tags: false },
+        Self { grid: true, listed: true, tags: true },
+    ];
+
+    /// The function `indirect(position, normal, geometric_normal, tag) -> Gathered` with its bindings in the groups 0 and 1.
+    #[must_use]
+    pub fn indirect(self) -> String {
+        let tags = if self.tags {
+            include_str!("../wgsl/shared/tags.wgsl")
+        } else {
+            include_str!("../wgsl/shared/no_tags.wgsl")
+        };
+        let by_grid = [BLEND, FAR, GATHER_STATIC];
+        let by_list = [tags, include_str!("../wgsl/shared/gather_listed.wgsl")];
+        let mut parts = vec![FORM_FACTOR, LIGHTS, GRID];
+        if self.grid {
+            parts.extend(by_grid);
+        }
+        if self.listed {
+            parts.extend(by_list);
+        }
+        parts.push(match (self.grid, self.listed) {
+            (_, false) => include_str!("../wgsl/shared/indirect_grid.wgsl"),
+            (false, true) => include_str!("../wgsl/shared/indirect_listed.wgsl"),
+            (true, true) => include_str!("../wgsl/shared/indirect_moving.wgsl"),
+        });
+        parts.join("\n")
+    }
+
+    /// [`Gathering::indirect`] for a forward shader, with its bindings in the groups `first_group` and the next.
+    #[must_use]
+    pub fn forward(self, first_group: u32) -> String {
+        let group = |number: u32| format!("@group({number})");
+        let source = self.indirect().replace("@group(1)", "@group(second)");
+        source.replace("@group(0)", &group(first_group)).replace("@group(second)", &group(first_group + 1))
+    }
+
+    /// Phase 2 at every pixel of a G-buffer; entry point `gather`, 8 x 8 invocations per workgroup. `counted` counts the pairs, `float` writes
+    /// single precision in place of halves.
+    #[must_use]
+    pub fn deferred(self, counted: bool, float: bool) -> String {
+        let tags = if self.tags {
+            include_str!("../wgsl/shared/tag_texture.wgsl")
+        } else {
+            include_str!("../wgsl/shared/no_tag_texture.wgsl")
+        };
+        let count = if counted {
+            include_str!("../wgsl/shared/count.wgsl")
+        } else {
+            include_str!("../wgsl/shared/no_count.wgsl")
+        };
+        let view = include_str!("../wgsl/shared/view.wgsl");
+        let gather = include_str!("../wgsl/gather_deferred.wgsl");
+        let gather = if float { gather.replace("rgba16float", "rgba32float") } else { gather.to_owned() };
+        [&self.indirect(), view, tags, count, &gather].join("\n")
+    }
+
+    fn name(self) -> &'static str {
+        match (self.grid, self.listed, self.tags) {
+            (_, false, _) => "gather_deferred, grid",
+            (false, true, false) => "gather_deferred, listed",
+            (false, true, true) => "gather_deferred, listed with tags",
+            (true, true, false) => "gather_deferred, moving",
+            (true, true, true) => "gather_deferred, moving with tags",
+        }
+    }
 }
 
 /// Every shader with its name.
 #[must_use]
-pub fn all() -> [(&'static str, String); 7] {
-    [
+pub fn all() -> Vec<(&'static str, String)> {
+    let mut all = vec![
         ("form_factor_cases", form_factor_cases()),
         ("form_factor_sums", form_factor_sums()),
+        ("direct", direct()),
         ("inject", inject()),
         ("refresh", refresh()),
         ("refresh_free", refresh_free()),
         ("gather_static", gather_static()),
         ("gather_free", gather_free()),
-    ]
+    ];
+    all.extend(Gathering::ALL.map(|gathering| (gathering.name(), gathering.deferred(true, false))));
+    all
 }

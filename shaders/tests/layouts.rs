@@ -4,12 +4,14 @@ use std::mem::{offset_of, size_of};
 
 use naga::proc::Layouter;
 use vlm_format::{Leaf, Probe, Sample, Uncovered};
+use vlm_shaders::cpu::direct::{DirectHeader, PackedLight, Point, Span};
 use vlm_shaders::cpu::form_factor::LightGeometry;
 use vlm_shaders::cpu::free_light::FreeLight;
 use vlm_shaders::cpu::gather::Receiver;
 use vlm_shaders::cpu::refresh::{FarLight, FarSource};
+use vlm_shaders::cpu::view::View;
 use vlm_shaders::tables::{GridHeader, LightSurface};
-use vlm_shaders::wgsl;
+use vlm_shaders::wgsl::{self, Gathering};
 
 /// A struct's members (name, offset, size), its size, and the strides of the arrays that hold it.
 #[derive(Debug, PartialEq)]
@@ -102,7 +104,7 @@ fn the_grid() {
         light_count,
         sample_count,
         uncovered_count,
-        padding
+        light_tags
     );
     let leaf = layout_of!(Leaf, 0, probes, free_probes);
     for source in [wgsl::inject(), wgsl::refresh(), wgsl::gather_static()] {
@@ -143,6 +145,34 @@ fn surface_and_receivers() {
     assert_eq!(layout(&inject, "Uncovered"), uncovered);
     let receiver = layout_of!(Receiver, 1, position, normal, geometric_normal, tag);
     assert_eq!(layout(&wgsl::gather_static(), "Receiver"), receiver);
+}
+
+#[test]
+fn direct_light_and_views() {
+    let direct = wgsl::direct();
+    let light = layout_of!(
+        PackedLight,
+        1,
+        position,
+        inverse_range,
+        direction,
+        directional,
+        intensity,
+        cone_scale,
+        cone_offset,
+        padding,
+        padding_2,
+        padding_3
+    );
+    assert_eq!(layout(&direct, "PunctualLight"), light);
+    let header = layout_of!(DirectHeader, 0, light_count, point_count, span_count, has_visibility);
+    assert_eq!(layout(&direct, "DirectHeader"), header);
+    assert_eq!(layout(&direct, "Point"), layout_of!(Point, 1, position, padding, normal, padding_2));
+    assert_eq!(layout(&direct, "Span"), layout_of!(Span, 1, first, count));
+    let view = layout_of!(View, 0, world_from_clip, exposure, empty_depth, padding, padding_2);
+    for gathering in Gathering::ALL {
+        assert_eq!(layout(&gathering.deferred(false, false), "View"), view);
+    }
 }
 
 #[test]

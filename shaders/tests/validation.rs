@@ -1,7 +1,7 @@
 //! Every shader parses, validates and keeps within WebGPU's default limits, without a GPU.
 
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
-use vlm_shaders::wgsl;
+use vlm_shaders::wgsl::{self, Gathering};
 
 /// Storage buffers per stage by WebGPU's default limits.
 const MOST_STORAGE_BUFFERS: usize = 8;
@@ -17,6 +17,12 @@ fn parse(source: &str) -> Result<(naga::Module, ModuleInfo), String> {
 fn every_shader_validates() {
     for (name, source) in wgsl::all() {
         parse(&source).unwrap_or_else(|error| panic!("{name}: {error}"));
+    }
+    for gathering in Gathering::ALL {
+        parse(&gathering.deferred(false, true)).unwrap_or_else(|error| panic!("{gathering:?}: {error}"));
+        let forward = gathering.forward(2);
+        assert!(!forward.contains("@group(0)") && !forward.contains("@group(1)"));
+        parse(&forward).unwrap_or_else(|error| panic!("{gathering:?}: {error}"));
     }
     assert!(
         parse(&wgsl::form_factor_cases().replace("let cut_b", "let cut_d")).is_err(),

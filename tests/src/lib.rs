@@ -11,6 +11,7 @@ pub mod gpu;
 pub mod form_factor;
 pub mod grid_gpu;
 pub mod active_hemisphere;
+pub mod runtime_gpu;
 pub mod thesis;
 pub mod plot;
 pub mod random;

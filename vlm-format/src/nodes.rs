@@ -34,8 +34,30 @@ pub(crate) fn path(file: &GltfFile, parents: &[Option<usize>], node: usize) -> S
     names.join("/")
 }
 
-/// `world_from_node` of every node. Iterative: chains may be a million nodes long.
+impl GltfFile {
+    /// The global transform of every node at rest, metres. Rotations count as unit quaternions in spite of the file's rounding.
+    #[must_use]
+    pub fn world_from_nodes(&self) -> Vec<DMat4> {
+        world_from(self, &parents(self), |node| parent_from_node(node, unit_quaternion))
+    }
+}
+
+/// The rotation (x, y, z, w), of unit length; no rotation for 0.
+fn unit_quaternion(rotation: DQuat) -> DQuat {
+    if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY }
+}
+
+/// `world_from_node` of every node, with rotations as the file has them, so that digests of it never change.
 pub(crate) fn world_from_nodes(file: &GltfFile, parents: &[Option<usize>]) -> Vec<DMat4> {
+    world_from(file, parents, |node| parent_from_node(node, |rotation| rotation))
+}
+
+/// Iterative: chains may be a million nodes long.
+fn world_from(
+    file: &GltfFile,
+    parents: &[Option<usize>],
+    parent_from_node: impl Fn(&Value) -> DMat4,
+) -> Vec<DMat4> {
     let nodes = array(file.json(), "/nodes");
     let mut world: Vec<Option<DMat4>> = vec![None; nodes.len()];
     let mut chain = Vec::new();
@@ -54,12 +76,13 @@ pub(crate) fn world_from_nodes(file: &GltfFile, parents: &[Option<usize>]) -> Ve
 }
 
 /// The node's own transform, in the precision of the JSON.
-fn parent_from_node(node: &Value) -> DMat4 {
+fn parent_from_node(node: &Value, rotation_of: impl Fn(DQuat) -> DQuat) -> DMat4 {
     if let Some(matrix) = numbers::<16>(node, "matrix") {
         return DMat4::from_cols_array(&matrix);
     }
     let translation = numbers(node, "translation").map_or(DVec3::ZERO, DVec3::from_array);
-    let rotation = numbers(node, "rotation").map_or(DQuat::IDENTITY, DQuat::from_array);
+    let rotation = numbers(node, "rotation")
+        .map_or(DQuat::IDENTITY, |rotation| rotation_of(DQuat::from_array(rotation)));
     let scale = numbers(node, "scale").map_or(DVec3::ONE, DVec3::from_array);
     DMat4::from_scale_rotation_translation(scale, rotation, translation)
 }
@@ -69,4 +92,21 @@ pub(crate) fn numbers<const N: usize>(value: &Value, key: &str) -> Option<[f64; 
     let list = value.get(key)?.as_array()?;
     let numbers: Vec<f64> = list.iter().map_while(Value::as_f64).collect();
     numbers.try_into().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn transforms_follow_the_tree_with_unit_rotations() {
+        // A quarter turn about z, by a quaternion that is a little too long: the child's +x is up.
+        let json = r#"{"asset":{"version":"2.0"},"nodes":[
+            {"translation":[0,2,0],"rotation":[0,0,0.709,0.709],"children":[1]},{"translation":[1,0,0]}]}"#;
+        let file = GltfFile::from_slice(json.as_bytes(), "tree.gltf", None).unwrap();
+        let world = file.world_from_nodes();
+        assert!((world[1].w_axis.truncate() - DVec3::new(0.0, 3.0, 0.0)).length() < 1e-12, "{world:?}");
+        let raw = world_from_nodes(&file, &parents(&file));
+        assert!((raw[1].w_axis.truncate() - DVec3::new(0.0, 3.0, 0.0)).length() > 1e-3, "as the file has it");
+    }
 }

@@ -2,6 +2,7 @@
 
 pub mod upload;
 pub mod punctual;
+pub mod direct;
 pub mod inject;
 pub mod form_factor;
 pub mod free_light;
@@ -10,4 +11,5 @@ pub mod grid;
 pub mod gather;
 pub mod gather_static;
 pub mod gather_free;
+pub mod view;
 pub mod resolve;

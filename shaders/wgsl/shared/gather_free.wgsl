@@ -7,7 +7,7 @@ const LEAST_BENT_COSINE: f32 = 0.8;
 const FARTHEST: u32 = 16u;
 
 // What `refresh_free` found.
-@group(1) @binding(4) var<storage, read> free: array<FreeLight>;
+@group(1) @binding(6) var<storage, read> free: array<FreeLight>;
 
 fn gather_free(position: vec3f, normal: vec3f) -> Gathered {
     let leaf = leaf_around(position);

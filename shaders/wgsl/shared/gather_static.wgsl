@@ -1,14 +1,6 @@
-// Irradiance at a point of a surface that stands still. After shared/form_factor.wgsl, shared/grid.wgsl, shared/blend.wgsl and
-// shared/far.wgsl; mirror: src/cpu/gather_static.rs.
+// Irradiance at a point of a surface that stands still. After shared/form_factor.wgsl, shared/lights.wgsl, shared/grid.wgsl,
+// shared/blend.wgsl and shared/far.wgsl; mirror: src/cpu/gather_static.rs.
 
-struct Gathered {
-    irradiance: vec3f,
-    // Lights whose geometry was read.
-    pairs: u32,
-}
-
-// World space, one per light.
-@group(1) @binding(1) var<storage, read> lights: array<LightGeometry>;
 // What `refresh` found.
 @group(1) @binding(2) var<storage, read> far: array<FarLight>;
 @group(1) @binding(3) var<storage, read> near_radiosities: array<vec4f>;

@@ -24,7 +24,7 @@ struct GridHeader {
     light_count: u32,
     sample_count: u32,
     uncovered_count: u32,
-    padding: u32,
+    light_tags: u32,
 }
 
 struct Leaf {

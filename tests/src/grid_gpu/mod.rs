@@ -189,13 +189,13 @@ impl GridPasses {
         receivers: &[Receiver],
     ) -> Result<Vec<Gathered>, GpuError> {
         let free = self.gpu.input("free", bytemuck::cast_slice(&arrived.free));
-        self.gather_by(&self.gather_free, &[&free], scene, arrived, receivers)
+        self.gather_by(&self.gather_free, &[(6, &free)], scene, arrived, receivers)
     }
 
     fn gather_by(
         &self,
         pipeline: &ComputePipeline,
-        more: &[&Buffer],
+        more: &[(u32, &Buffer)],
         scene: &Uploaded,
         arrived: &Arrived,
         receivers: &[Receiver],
@@ -207,11 +207,14 @@ impl GridPasses {
             gpu.input("far", bytemuck::cast_slice(&arrived.far)),
             self.vectors("near_radiosities", &arrived.near),
         );
-        let group: Vec<&Buffer> =
-            [&scene.probes, &lights, &far, &near].into_iter().chain(more.iter().copied()).collect();
+        let mut group: Vec<(u32, &Buffer)> = (0..).zip([&scene.probes, &lights, &far, &near]).collect();
+        group.extend_from_slice(more);
         let points = [&gpu.input("receivers", bytemuck::cast_slice(receivers)), &gathered];
-        let groups =
-            [self.common(pipeline, scene), gpu.group(pipeline, 1, &group), gpu.group(pipeline, 2, &points)];
+        let groups = [
+            self.common(pipeline, scene),
+            gpu.group_at(pipeline, 1, &group),
+            gpu.group(pipeline, 2, &points),
+        ];
         self.dispatch(pipeline, &groups, receivers.len());
         let gathered: Vec<GatheredWords> = self.read(&gathered)?;
         let widened = |g: GatheredWords| Gathered { irradiance: g.irradiance, pairs: u64::from(g.pairs) };

@@ -1,4 +1,4 @@
-//! How far around itself a probe counts: to where walls begin.
+//! How far around itself a probe counts: to where walls begin, and steps.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -16,7 +16,7 @@ const REACH: f32 = 1.45;
 const HEIGHT: f32 = 0.5;
 
 /// Rays along the surface.
-pub(super) const AROUND: u32 = 32;
+const AROUND: u32 = 32;
 
 /// They run at this height, over the reach. Lower ones are stopped by smaller steps.
 const LIFT: f32 = 0.12;

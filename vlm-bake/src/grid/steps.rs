@@ -3,8 +3,11 @@
 use glam::Vec3;
 
 use super::pool::Place;
-use super::reach::{AROUND, Wall};
+use super::reach::Wall;
 use crate::shade::TraceScene;
+
+/// Directions in which steps are looked for. More of them find shorter steps.
+const DIRECTIONS: u32 = 16;
 
 /// Places along each direction at which the height of the surface is taken. More of them find lower steps and narrower grooves.
 const STATIONS: u32 = 16;
@@ -30,12 +33,12 @@ pub fn steps(trace: &TraceScene, place: &Place, reach: f32, [top, down]: [f32; 2
     let surface = &place.surface;
     let (u, v) = surface.geometric_normal.any_orthonormal_pair();
     let step = |i: u32| {
-        let (sin, cos) = (std::f32::consts::TAU * (i as f32 + 0.5) / AROUND as f32).sin_cos();
+        let (sin, cos) = (std::f32::consts::TAU * (i as f32 + 0.5) / DIRECTIONS as f32).sin_cos();
         let direction = u * cos + v * sin;
         let distance = first_step(trace, place, direction, reach, [top, down])?;
         Some(Wall { distance, at: direction * distance, facing: -direction })
     };
-    let mut all: Vec<Option<Wall>> = (0..AROUND).map(step).collect();
+    let mut all: Vec<Option<Wall>> = (0..DIRECTIONS).map(step).collect();
     face(&mut all, surface.geometric_normal);
     all.into_iter().flatten().collect()
 }

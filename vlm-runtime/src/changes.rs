@@ -1,0 +1,243 @@
+//! What changed since the last frame: which points need their direct light anew.
+
+use glam::Vec3;
+use vlm_shaders::cpu::direct::{Point, Span};
+use vlm_shaders::cpu::punctual::PunctualLight;
+use vlm_shaders::cpu::upload::LightSet;
+
+use crate::stats::Skipped;
+
+/// The most points of a span: more of them make fewer, longer invocations.
+const MOST_POINTS: u32 = 64;
+
+/// Points that are lit together: samples of one light, or one piece of surface without a light.
+#[derive(Clone, Debug)]
+struct LitSpan {
+    span: Span,
+    /// `None` for surface without a light.
+    light: Option<u32>,
+    least: Vec3,
+    most: Vec3,
+    /// Needs its light anew.
+    dirty: bool,
+}
+
+/// What the last frame was lit by, and what changed since.
+pub(crate) struct Changes {
+    /// Those that reflect something, by their points.
+    spans: Vec<LitSpan>,
+    /// Of all the asset's.
+    light_count: u32,
+    /// Lights that reflect nothing.
+    black: u32,
+    lights: Vec<PunctualLight>,
+    visibility: Option<Vec<f32>>,
+    point_count: usize,
+}
+
+impl Changes {
+    /// Everything is to be lit.
+    pub(crate) fn new(set: &LightSet, reflectance_of_pieces: &[Vec3], points: &[Point]) -> Self {
+        let reflects = |sample: u32| {
+            set.samples.get(sample as usize).is_some_and(|sample| sample.reflectance != Vec3::ZERO)
+        };
+        let mut spans = Vec::new();
+        let mut black = 0;
+        for light in 0..set.len() {
+            let range = set.sample_range(light).unwrap_or_default();
+            let (start, end) = (range.start as u32, range.end.min(set.samples.len()) as u32);
+            if !(start..end).any(reflects) {
+                black += 1;
+                continue;
+            }
+            for first in (start..end).step_by(MOST_POINTS as usize) {
+                let count = (end - first).min(MOST_POINTS);
+                spans.push(LitSpan::new(Span { first, count }, Some(light as u32), points));
+            }
+        }
+        for (piece, reflectance) in reflectance_of_pieces.iter().enumerate() {
+            if *reflectance != Vec3::ZERO {
+                let first = (set.samples.len() + piece) as u32;
+                spans.push(LitSpan::new(Span { first, count: 1 }, None, points));
+            }
+        }
+        Self {
+            spans,
+            light_count: set.len() as u32,
+            black,
+            lights: Vec::new(),
+            visibility: None,
+            point_count: points.len(),
+        }
+    }
+
+    /// Number of spans there are.
+    pub(crate) fn span_count(&self) -> usize {
+        self.spans.len()
+    }
+
+    /// The spans whose light is to be found anew.
+    pub(crate) fn dirty(&self) -> Vec<Span> {
+        self.spans.iter().filter(|lit| lit.dirty).map(|lit| lit.span).collect()
+    }
+
+    /// How many lights that is, and how many are skipped.
+    pub(crate) fn counts(&self) -> (u32, Skipped) {
+        let mut injected: Vec<u32> =
+            self.spans.iter().filter(|lit| lit.dirty).filter_map(|lit| lit.light).collect();
+        injected.dedup();
+        let injected = injected.len() as u32;
+        (injected, Skipped { unchanged: self.light_count - self.black - injected, black: self.black })
+    }
+
+    /// All that was dirty has its light.
+    pub(crate) fn clean(&mut self) {
+        self.spans.iter_mut().for_each(|lit| lit.dirty = false);
+    }
+
+    /// Takes a frame's real lights; true if any of them changed.
+    pub(crate) fn light(&mut self, lights: &[PunctualLight]) -> bool {
+        let before = std::mem::replace(&mut self.lights, lights.to_vec());
+        let changed: Vec<PunctualLight> = (0..before.len().max(lights.len()))
+            .filter(|&i| before.get(i) != lights.get(i))
+            .flat_map(|i| before.get(i).into_iter().chain(lights.get(i)).copied())
+            .collect();
+        for lit in &mut self.spans {
+            lit.dirty |= changed.iter().any(|light| lit.is_reached(light));
+        }
+        !changed.is_empty()
+    }
+
+    /// Takes a frame's visibility; the numbers of the lights for which any of it changed.
+    pub(crate) fn see(&mut self, visibility: &[f32]) -> Vec<u32> {
+        let before = self.visibility.replace(visibility.to_vec());
+        let points = self.point_count.max(1);
+        let before = before.unwrap_or_default();
+        let row =
+            |all: &[f32], light: usize| all.get(light * points..(light + 1) * points).map(<[f32]>::to_vec);
+        let mut changed = Vec::new();
+        for (light, now) in visibility.chunks(points).enumerate() {
+            // Before the first visibility, every point saw every light.
+            let then = row(&before, light).unwrap_or_else(|| vec![1.0; now.len()]);
+            let differs = |lit: &LitSpan| {
+                let span = lit.span.first as usize..(lit.span.first + lit.span.count) as usize;
+                then.get(span.clone()) != now.get(span)
+            };
+            if then == now && !before.is_empty() {
+                continue;
+            }
+            changed.push(light as u32);
+            self.spans.iter_mut().filter(|lit| differs(lit)).for_each(|lit| lit.dirty = true);
+        }
+        changed
+    }
+
+    /// Whether visibility was ever given.
+    pub(crate) fn has_visibility(&self) -> bool {
+        self.visibility.is_some()
+    }
+
+    /// Numbers of visibility as it was last given.
+    pub(crate) fn visibility_len(&self) -> usize {
+        self.visibility.as_ref().map_or(0, Vec::len)
+    }
+
+    /// The points of some lights moved.
+    pub(crate) fn moved(&mut self, lights: std::ops::Range<u32>, points: &[Point]) {
+        for lit in &mut self.spans {
+            if lit.light.is_some_and(|light| lights.contains(&light)) {
+                *lit = LitSpan::new(lit.span, lit.light, points);
+            }
+        }
+    }
+}
+
+impl LitSpan {
+    fn new(span: Span, light: Option<u32>, points: &[Point]) -> Self {
+        let own = points.get(span.first as usize..(span.first + span.count) as usize).unwrap_or(&[]);
+        let (mut least, mut most) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for point in own {
+            least = least.min(point.position);
+            most = most.max(point.position);
+        }
+        Self { span, light, least, most, dirty: true }
+    }
+
+    /// False only where a light's range ends before all points.
+    fn is_reached(&self, light: &PunctualLight) -> bool {
+        if light.directional {
+            return true;
+        }
+        let nearest = light.position.clamp(self.least.min(self.most), self.most.max(self.least));
+        let is_beyond = nearest.distance(light.position) > light.range;
+        !is_beyond
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use vlm_format::Sample;
+
+    /// Lights of one, none and 70 samples at x = 0, 10 and 20, then a piece at x = 30.
+    fn changes() -> Changes {
+        let sample = |x: f32, reflectance: f32| Sample {
+            position: Vec3::X * x,
+            normal: Vec3::Z,
+            reflectance: Vec3::splat(reflectance),
+        };
+        let mut samples = vec![sample(0.0, 0.5), sample(10.0, 0.0)];
+        samples.extend((0..70).map(|_| sample(20.0, 0.5)));
+        let set = LightSet {
+            geometry: vec![Default::default(); 3],
+            sample_starts: vec![0, 1, 2, 72],
+            samples,
+            ..LightSet::default()
+        };
+        let mut points = vlm_shaders::cpu::direct::points(&set, &[]);
+        points.push(Point { position: Vec3::X * 30.0, ..Point::default() });
+        Changes::new(&set, &[Vec3::ONE], &points)
+    }
+
+    #[test]
+    fn long_lights_divide_and_black_ones_are_left_out() {
+        let changes = changes();
+        let spans: Vec<(u32, u32)> = changes.dirty().iter().map(|span| (span.first, span.count)).collect();
+        assert_eq!(spans, [(0, 1), (2, 64), (66, 6), (72, 1)]);
+        assert_eq!(changes.counts(), (2, Skipped { unchanged: 0, black: 1 }));
+    }
+
+    #[test]
+    fn only_what_a_changed_light_reaches_is_dirty() {
+        let mut changes = changes();
+        let lamp = PunctualLight { range: 3.0, ..PunctualLight::point(Vec3::X * -2.0, Vec3::ONE) };
+        assert!(changes.light(&[lamp]));
+        changes.clean();
+        assert!(!changes.light(&[lamp]) && changes.dirty().is_empty(), "the same light");
+        assert!(changes.light(&[PunctualLight { intensity: Vec3::X, ..lamp }]));
+        assert_eq!(changes.dirty().len(), 1);
+        assert_eq!(changes.counts(), (1, Skipped { unchanged: 1, black: 1 }));
+        changes.clean();
+        // Where it was and where it is.
+        assert!(changes.light(&[PunctualLight { position: Vec3::X * 29.0, ..lamp }]));
+        assert_eq!(changes.dirty(), [Span { first: 0, count: 1 }, Span { first: 72, count: 1 }]);
+        changes.clean();
+        assert!(changes.light(&[]), "it went out");
+        assert_eq!(changes.dirty().len(), 1);
+    }
+
+    #[test]
+    fn only_points_whose_visibility_changed_are_dirty() {
+        let mut changes = changes();
+        changes.light(&[PunctualLight::directional(Vec3::Z, Vec3::ONE); 2]);
+        changes.clean();
+        let mut visibility = vec![1.0; 2 * 73];
+        assert_eq!(changes.see(&visibility), [0, 1], "the first time all is written");
+        assert!(changes.dirty().is_empty(), "but as long as every point sees every light, none changed");
+        visibility[73 + 70] = 0.5;
+        assert_eq!(changes.see(&visibility), [1]);
+        assert_eq!(changes.dirty(), [Span { first: 66, count: 6 }]);
+        changes.clean();
+        assert!(changes.see(&visibility).is_empty() && changes.dirty().is_empty());
+    }
+}
