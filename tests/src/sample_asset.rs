@@ -11,6 +11,11 @@ use vlm_format::{
 /// Two lights for each of the first two nodes with a mesh, with samples, tags, emission and a grid. The first primitive that
 /// draws triangles is tagged as a whole, the second by triangle, the first bearer and the last node as nodes.
 pub fn quads(file: &GltfFile) -> VlmAsset {
+    many_quads(file, 1)
+}
+
+/// [`quads`] with so many times the lights, cells and pieces of uncovered surface.
+pub fn many_quads(file: &GltfFile, times: u32) -> VlmAsset {
     let mut asset = VlmAsset {
         generator: String::from("sample 1.0"),
         settings: Settings {
@@ -27,15 +32,15 @@ pub fn quads(file: &GltfFile) -> VlmAsset {
     };
     let bearers = file.document().nodes().filter(|node| node.mesh().is_some()).take(2);
     for node in bearers {
-        push_quad(&mut asset, node.index() as u32);
+        push_quads(&mut asset, node.index() as u32, times);
     }
     tag_surface(&mut asset, file);
-    asset.grid = Some(grid(asset.triangles.len() as u32, asset.samples.len()));
+    asset.grid = Some(grid(asset.triangles.len() as u32, asset.samples.len(), times));
     asset
 }
 
-/// Two cells of 24, one divided, over a probe on surface and one in free space.
-fn grid(lights: u32, samples: usize) -> Grid {
+/// Two cells of 24 times `times`, one divided, over a probe on surface and one in free space.
+fn grid(lights: u32, samples: usize, times: u32) -> Grid {
     let mut rows = RowWriter::default();
     rows.push(0, (0..lights).map(|light| (light, 200)));
     rows.push(0, (0..lights.min(1)).map(|light| (light, 1)));
@@ -49,12 +54,19 @@ fn grid(lights: u32, samples: usize) -> Grid {
         reach_down: 0.05,
         reach: [0.1, 0.2, 0.1, 0.1],
     };
-    let mut cells = vec![0; 24 + 8];
-    (cells[1], cells[23], cells[24]) = (1, 2 * 24, 3);
+    let roots = 24 * times as usize;
+    let mut cells = vec![0; roots + 8];
+    (cells[1], cells[roots - 1], cells[roots]) = (1, 48 * times, 3);
+    let piece = |i: u32| Uncovered {
+        position: Vec3::splat(i as f32),
+        normal: Vec3::Y,
+        reflectance: Vec3::splat(0.5),
+        ..Uncovered::default()
+    };
     Grid {
         origin: Vec3::new(-0.1, 0.2, 1e-7),
         cell_size: 0.1,
-        dimensions: [2, 3, 4],
+        dimensions: [2, 3, 4 * times],
         cells,
         leaves: vec![
             Leaf { probes: 0, free_probes: 1 },
@@ -69,7 +81,7 @@ fn grid(lights: u32, samples: usize) -> Grid {
         surface_probes: 1,
         sample_shares: vec![1.0; samples],
         surface_gains: vec![1.0; lights as usize],
-        uncovered: vec![Uncovered { normal: Vec3::Y, reflectance: Vec3::splat(0.5), ..Uncovered::default() }],
+        uncovered: (0..times).map(piece).collect(),
         row_starts: rows.starts,
         rows: rows.words,
     }
@@ -97,23 +109,28 @@ fn tag_surface(asset: &mut VlmAsset, file: &GltfFile) {
     asset.node_tags.dedup();
 }
 
-fn push_quad(asset: &mut VlmAsset, node: u32) {
+fn push_quads(asset: &mut VlmAsset, node: u32, count: u32) {
     let (light, vertex) = (asset.triangles.len() as u32, asset.positions.len() as u32);
     let authored = node % 2 == 1;
     asset.vlms.push(Vlm {
         id: format!("vlm-{node}"),
         node,
-        lights: [light, 2],
-        vertices: [vertex, 4],
+        lights: [light, 2 * count],
+        vertices: [vertex, 4 * count],
         authored,
     });
-    asset.positions.extend([Vec3::ZERO, Vec3::X, Vec3::X + Vec3::Y, Vec3::Y]);
+    (0..count).for_each(|i| push_quad(asset, node, Vec3::Z * i as f32));
+}
+
+fn push_quad(asset: &mut VlmAsset, node: u32, corner: Vec3) {
+    let (light, vertex) = (asset.triangles.len() as u32, asset.positions.len() as u32);
+    asset.positions.extend([Vec3::ZERO, Vec3::X, Vec3::X + Vec3::Y, Vec3::Y].map(|at| corner + at));
     for corners in [[0, 1, 2], [0, 2, 3]] {
         asset.triangles.push(corners.map(|corner| vertex + corner));
         asset.albedo.push(Vec3::new(0.5, 0.25, 1.0 / 3.0));
         asset.emission.push(Vec3::splat(light as f32));
         asset.tags.push(node);
-        asset.samples.push(Sample { position: Vec3::splat(0.1), normal: Vec3::Z, reflectance: Vec3::ONE });
+        asset.samples.push(Sample { position: corner + 0.1, normal: Vec3::Z, reflectance: Vec3::ONE });
         asset.sample_starts.push(asset.samples.len() as u32);
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde_json::{Value, json};
-use vlm_format::{Container, GltfFile, Target, write_atomic, write_vlm};
+use vlm_format::{Container, GltfFile, Target, WriteOptions, write_atomic, write_vlm_with};
 use vlm_tests::{assets, sample_asset};
 
 /// Files that are valid as they are.
@@ -16,6 +16,13 @@ const FILES: &[&str] = &[
     "generated/suzanne_quantized.glb",
     "generated/sparse_positions.gltf",
     "blender_io/19_sheen/19_sheen.gltf",
+];
+
+/// What each of them is written to, plain and compressed.
+const CONTAINERS: [(Container, &str); 3] = [
+    (Container::Glb, "out.glb"),
+    (Container::Gltf { embedded: false }, "out.gltf"),
+    (Container::Gltf { embedded: true }, "embedded.gltf"),
 ];
 
 /// True if the node modules are there. Without them the tests are ignored, or fail where `VLM_REQUIRE_NPM=1` promises
@@ -49,18 +56,23 @@ fn written_files_have_no_errors() {
     let mut by_triangle = 0;
     for (i, name) in FILES.iter().enumerate() {
         let file = GltfFile::open(&corpus.join(name)).unwrap();
-        let asset = sample_asset::quads(&file);
+        let asset = sample_asset::many_quads(&file, 20);
         by_triangle += asset.triangle_tags.len();
-        for (container, file_name) in [
-            (Container::Glb, "out.glb"),
-            (Container::Gltf { embedded: false }, "out.gltf"),
-            (Container::Gltf { embedded: true }, "embedded.gltf"),
-        ] {
-            let below = folder.path().join(i.to_string());
+        for (options, (container, file_name)) in [false, true]
+            .into_iter()
+            .flat_map(|compress| CONTAINERS.map(|to| (WriteOptions { compress }, to)))
+        {
+            let below = folder.path().join(format!("{i}{}", if options.compress { "c" } else { "" }));
             std::fs::create_dir_all(&below).unwrap();
             let target = Target { container, file_name: file_name.to_owned() };
-            write_atomic(&write_vlm(&file, &asset, &target).unwrap(), &below).unwrap();
+            write_atomic(&write_vlm_with(&file, &asset, &target, &options).unwrap(), &below).unwrap();
             written.push(below.join(file_name));
+            let json = GltfFile::open(&below.join(file_name)).unwrap().json().to_string();
+            assert_eq!(json.contains("\"compression\":{\"mode\""), options.compress, "{name}");
+            let required =
+                GltfFile::open(&corpus.join(name)).unwrap().json().get("extensionsRequired").cloned();
+            let json: Value = serde_json::from_str(&json).unwrap();
+            assert_eq!(json.get("extensionsRequired"), required.as_ref(), "{name}");
         }
     }
     let inputs: Vec<PathBuf> = FILES.iter().map(|name| corpus.join(name)).collect();
@@ -79,17 +91,21 @@ fn a_broken_file_has_errors() {
     let file = GltfFile::open(&corpus.join("generated/sparse_positions.gltf")).unwrap();
     let target =
         Target { container: Container::Gltf { embedded: true }, file_name: String::from("broken.gltf") };
-    let outputs = write_vlm(&file, &sample_asset::quads(&file), &target).unwrap();
-    let mut json: Value = serde_json::from_slice(&outputs[0].bytes).unwrap();
-    *json["accessors"].as_array_mut().unwrap().last_mut().unwrap().get_mut("count").unwrap() = json!(1000);
-    json["extensionsUsed"] = json!([]);
-
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("broken.gltf");
-    std::fs::write(&path, json.to_string()).unwrap();
-    let reports = validate(&[path]);
-    let codes: Vec<&Value> = errors(&reports[0]).iter().map(|message| &message["code"]).collect();
-    assert!(codes.contains(&&json!("ACCESSOR_TOO_LONG")), "{codes:?}");
+    for compress in [false, true] {
+        let asset = sample_asset::many_quads(&file, 20);
+        let outputs = write_vlm_with(&file, &asset, &target, &WriteOptions { compress }).unwrap();
+        let mut json: Value = serde_json::from_slice(&outputs[0].bytes).unwrap();
+        *json["accessors"].as_array_mut().unwrap().last_mut().unwrap().get_mut("count").unwrap() =
+            json!(100_000);
+        json["extensionsUsed"] = json!([]);
+
+        let path = folder.path().join("broken.gltf");
+        std::fs::write(&path, json.to_string()).unwrap();
+        let reports = validate(&[path]);
+        let codes: Vec<&Value> = errors(&reports[0]).iter().map(|message| &message["code"]).collect();
+        assert!(codes.contains(&&json!("ACCESSOR_TOO_LONG")), "{codes:?}");
+    }
 }
 
 #[test]

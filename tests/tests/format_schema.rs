@@ -7,8 +7,10 @@ use std::path::Path;
 
 use jsonschema::Validator;
 use serde_json::{Value, json};
-use vlm_format::{Container, EXTENSION, GltfFile, Target, VlmAsset, write_vlm};
-use vlm_tests::sample_asset::{quads, room};
+use vlm_format::{
+    Container, EXTENSION, GltfFile, OutputFile, Target, VlmAsset, WriteOptions, write_vlm, write_vlm_with,
+};
+use vlm_tests::sample_asset::{many_quads, quads, room};
 
 fn schema(object: &str) -> Validator {
     let name = format!("../vlm-format/schema/{object}.{EXTENSION}.schema.json");
@@ -18,10 +20,23 @@ fn schema(object: &str) -> Validator {
     jsonschema::draft202012::new(&schema).unwrap()
 }
 
+fn target() -> Target {
+    Target { container: Container::Gltf { embedded: true }, file_name: String::from("room.gltf") }
+}
+
+fn json_of(outputs: &[OutputFile]) -> Value {
+    serde_json::from_slice(&outputs[0].bytes).unwrap()
+}
+
 fn written(file: &GltfFile, asset: &VlmAsset) -> Value {
-    let target =
-        Target { container: Container::Gltf { embedded: true }, file_name: String::from("room.gltf") };
-    serde_json::from_slice(&write_vlm(file, asset, &target).unwrap()[0].bytes).unwrap()
+    json_of(&write_vlm(file, asset, &target()).unwrap())
+}
+
+/// With all arrays compressed that are long enough.
+fn compressed() -> Value {
+    let file = room();
+    let options = WriteOptions { compress: true };
+    json_of(&write_vlm_with(&file, &many_quads(&file, 50), &target(), &options).unwrap())
 }
 
 #[test]
@@ -54,6 +69,7 @@ fn every_property_is_described() {
     let file = room();
     let json = written(&file, &quads(&file));
     let mut root = json["extensions"][EXTENSION].clone();
+    let mut compressed = compressed()["extensions"][EXTENSION].clone();
     let text = fs::read_to_string(
         Path::new(env!("CARGO_MANIFEST_DIR"))
             .join("../vlm-format/schema/glTF.VLM_virtual_light_mesh.schema.json"),
@@ -65,6 +81,9 @@ fn every_property_is_described() {
     strict.validate(&root).unwrap_or_else(|error| panic!("{error}"));
     root["lights"]["undescribed"] = json!(1);
     assert!(!strict.is_valid(&root));
+    strict.validate(&compressed).unwrap_or_else(|error| panic!("{error}"));
+    compressed["lights"]["positions"]["compression"]["undescribed"] = json!(1);
+    assert!(!strict.is_valid(&compressed));
 }
 
 /// Makes every object of a schema refuse properties that it does not describe.
@@ -103,6 +122,33 @@ fn broken_extensions_do_not_conform() {
         let mut broken = root.clone();
         *broken.pointer_mut(pointer).unwrap() = value;
         assert!(!schema.is_valid(&broken), "a wrong {pointer} conforms");
+    }
+}
+
+#[test]
+fn compression_conforms_and_what_is_broken_in_it_does_not() {
+    let root = &compressed()["extensions"][EXTENSION];
+    let (schema, primitive) = (schema("glTF"), schema("mesh.primitive"));
+    schema.validate(root).unwrap_or_else(|error| panic!("{error}"));
+    let tags = |array: &Value| primitive.is_valid(&json!({ "triangleTags": array }));
+    assert!(tags(&root["lights"]["tags"]));
+    for (key, value) in [
+        ("mode", json!("TRIANGLES")),
+        ("count", json!(0)),
+        ("byteStride", json!(6)),
+        ("byteStride", json!(260)),
+        ("byteLength", json!("all")),
+    ] {
+        let mut broken = root.clone();
+        broken["lights"]["tags"]["compression"][key] = value.clone();
+        assert!(!schema.is_valid(&broken), "{key} {value} conforms");
+        assert!(!tags(&broken["lights"]["tags"]), "{key} {value} conforms in a primitive");
+    }
+    for required in ["mode", "count", "byteStride", "byteLength"] {
+        let mut broken = root.clone();
+        broken["lights"]["tags"]["compression"].as_object_mut().unwrap().remove(required);
+        assert!(!schema.is_valid(&broken), "compression without {required} conforms");
+        assert!(!tags(&broken["lights"]["tags"]), "in a primitive, too");
     }
 }
 

@@ -1,7 +1,7 @@
 //! A static grid in numbers, as `vlm inspect` and the report's page show it.
 
 use serde::Serialize;
-use vlm_format::{Grid, Leaf};
+use vlm_format::{GltfFile, Grid, Leaf};
 
 /// A grid in numbers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -32,6 +32,8 @@ pub struct GridContent {
     pub mean_row: f64,
     /// Bytes of all arrays.
     pub bytes: usize,
+    /// Bytes that they take in the file: fewer where they are compressed.
+    pub stored_bytes: u64,
     /// Bytes of each array.
     pub bytes_by_array: Vec<ArrayBytes>,
     /// Leaves by how many probes on surface they list.
@@ -47,6 +49,8 @@ pub struct ArrayBytes {
     pub array: &'static str,
     /// Its size.
     pub bytes: usize,
+    /// Its size in the file: less where it is compressed.
+    pub stored_bytes: u64,
 }
 
 /// How many things have `from` to `to` of something, both included.
@@ -61,14 +65,15 @@ pub struct Bin {
 }
 
 impl GridContent {
-    /// Of a valid grid.
+    /// Of a valid grid, as if stored without compression.
     #[must_use]
     pub fn of(grid: &Grid) -> Self {
         let lists: Vec<&[u32]> = grid.leaves.windows(2).map(|leaf| probes_of_leaf(grid, leaf)).collect();
         let near = |list: &&[u32]| near_lights(grid, list.iter().copied());
         let roots = grid.dimensions.iter().map(|&cells| cells as usize).product();
         let sources: usize = (0..grid.probes.len()).map(|probe| grid.row(probe).count()).sum();
-        let bytes_by_array = grid.sizes().map(|(array, bytes)| ArrayBytes { array, bytes });
+        let bytes_by_array =
+            grid.sizes().map(|(array, bytes)| ArrayBytes { array, bytes, stored_bytes: bytes as u64 });
         Self {
             cell_size_m: grid.cell_size,
             dimensions: grid.dimensions,
@@ -83,10 +88,21 @@ impl GridContent {
             far_entries: grid.row_starts.get(grid.probes.len()).copied().unwrap_or(0),
             mean_row: sources as f64 / grid.probes.len().max(1) as f64,
             bytes: grid.byte_len(),
+            stored_bytes: grid.byte_len() as u64,
             bytes_by_array: bytes_by_array.into(),
             probes_of_leaves: histogram(lists.iter().map(|list| list.len())),
             near_lights_of_leaves: histogram(lists.iter().map(near)),
         }
+    }
+
+    /// The same with the sizes that its arrays have in the file from which it was read.
+    #[must_use]
+    pub fn stored_in(mut self, file: &GltfFile) -> Self {
+        for array in &mut self.bytes_by_array {
+            array.stored_bytes = file.stored_vlm_bytes(&format!("grid/{}", array.array));
+        }
+        self.stored_bytes = self.bytes_by_array.iter().map(|array| array.stored_bytes).sum();
+        self
     }
 }
 

@@ -81,6 +81,16 @@ impl GltfFile {
         read().map_err(|issue| issue.in_file(self.name()))
     }
 
+    /// The bytes of a SCALAR accessor of unsigned bytes.
+    pub(crate) fn read_bytes(&self, accessor: usize) -> Result<Vec<u8>, Error> {
+        let (json, bytes) = self.packed(accessor).map_err(|issue| issue.in_file(self.name()))?;
+        if self.accessor_type(accessor) != "SCALAR" || count(json, "componentType") != Some(UNSIGNED_BYTE) {
+            let message = String::from("not a SCALAR of unsigned bytes");
+            return Err(self.refuse(Code::AccessorType, accessor, message));
+        }
+        Ok(bytes)
+    }
+
     /// Indices of vertices, each below `vertex_count`.
     pub fn read_indices(&self, accessor: usize, vertex_count: usize) -> Result<Vec<u32>, Error> {
         let indices = self.read_u32(accessor)?;

@@ -32,6 +32,31 @@ pub(crate) fn decode(codec: &Value, encoded: &[u8], pointer: &str) -> Result<Vec
     decoded.ok_or_else(|| Issue::error(Code::Compression, pointer, "meshoptimizer cannot decode the data"))
 }
 
+/// Encodes little-endian words as [`decode`] reads them, by the `mode` and `byteStride` of `codec`: vertices, or a sequence of indices.
+///
+/// `None` if the codec cannot hold them, or the stride is none of those that this library writes.
+pub(crate) fn encode(codec: &Value, bytes: &[u8]) -> Option<Vec<u8>> {
+    let words: Vec<u32> = bytes.as_chunks().0.iter().map(|&word| u32::from_le_bytes(word)).collect();
+    let largest = words.iter().max().copied()?;
+    if codec.get("mode").is_some_and(|mode| mode == "INDICES") {
+        let bound = (largest as usize).saturating_add(1);
+        return meshopt::encode_index_sequence(&words, bound).ok().filter(|encoded| !encoded.is_empty());
+    }
+    match count(codec, "byteStride")? {
+        4 => encode_vertices::<1>(&words),
+        8 => encode_vertices::<2>(&words),
+        12 => encode_vertices::<3>(&words),
+        64 => encode_vertices::<16>(&words),
+        _ => None,
+    }
+}
+
+fn encode_vertices<const N: usize>(words: &[u32]) -> Option<Vec<u8>> {
+    // Level and version are given, so that nothing that a program sets for the whole process changes the bytes.
+    let encoded = meshopt::encode_vertex_buffer_level(words.as_chunks::<N>().0, 3, Some(1));
+    encoded.ok().filter(|encoded| !encoded.is_empty())
+}
+
 /// A vertex of N words. `[u32; N]` has a `Default` only up to 32 of them.
 #[derive(Clone)]
 struct Words<const N: usize>([u32; N]);

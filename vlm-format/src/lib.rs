@@ -13,6 +13,7 @@ mod uri;
 mod check;
 mod typed;
 mod codec;
+mod compress;
 mod container;
 mod accessor;
 mod asset;
@@ -37,7 +38,7 @@ pub use save::{write_atomic, write_file};
 pub use strip::EXTENSION;
 pub use tags::TriangleTags;
 pub use validate::{MAX_ASPECT_RATIO, validate};
-pub use write::{strip_vlm, write_vlm};
+pub use write::{WriteOptions, strip_vlm, write_vlm, write_vlm_with};
 
 /// Compiles the code of the README.
 #[cfg(doctest)]

@@ -4,7 +4,8 @@ use glam::Vec3;
 use serde_json::Value;
 
 use crate::asset::{Sample, Settings, Vlm, VlmAsset};
-use crate::check::{self, array, count, index};
+use crate::check::{self, array, count, index, layout};
+use crate::compress::{self, Codec};
 use crate::container::GltfFile;
 use crate::digest::{self, Source};
 use crate::error::{Error, Issue, Stale};
@@ -41,10 +42,11 @@ fn read(file: &GltfFile, trust: Trust) -> Result<Option<VlmAsset>, Error> {
     let Some(extension) = file.json().get("extensions").and_then(|all| all.get(EXTENSION)) else {
         return if_orphaned(file).map_or(Ok(None), |stale| refuse(file, vec![stale]));
     };
-    let mut reader = Reader { file, extension, trust, stale: Vec::new() };
+    let mut reader = Reader { file, extension, trust, stale: Vec::new(), invalid: Vec::new(), unclaimed: 0 };
     reader.check_shape();
     reader.fail_if_stale()?;
     let mut asset = reader.asset();
+    reader.fail_if_invalid()?;
     reader.bearers(&mut asset);
     reader.fail_if_stale()?;
     if trust == Trust::Verify {
@@ -82,6 +84,11 @@ struct Reader<'a> {
     extension: &'a Value,
     trust: Trust,
     stale: Vec<Stale>,
+    /// Compression that no writer makes.
+    invalid: Vec<Issue>,
+    /// Bytes of the buffer view that no array has claimed yet. No array of ours overlaps another: else a small file could name a large
+    /// accessor again and again.
+    unclaimed: usize,
 }
 
 /// An array of the extension.
@@ -90,13 +97,29 @@ struct Place<'a> {
     json: Option<&'a Value>,
     /// For messages.
     name: String,
+    /// JSON pointer of the array.
+    pointer: String,
     /// What is stale if the array was altered: `grid` or `asset`.
     vlm: &'static str,
+}
+
+/// Why an array cannot be read.
+enum Refusal {
+    /// Another tool changed what the array refers to.
+    Altered(String),
+    Invalid(Issue),
 }
 
 impl<'a> Reader<'a> {
     fn fail_if_stale(&mut self) -> Result<(), Error> {
         if self.stale.is_empty() { Ok(()) } else { refuse(self.file, std::mem::take(&mut self.stale)) }
+    }
+
+    fn fail_if_invalid(&mut self) -> Result<(), Error> {
+        match std::mem::take(&mut self.invalid) {
+            issues if issues.is_empty() => Ok(()),
+            issues => Err(Error::Invalid { file: self.file.name().to_owned(), issues }),
+        }
     }
 
     fn outdated(&mut self, vlm: &str, reason: String) {
@@ -111,6 +134,7 @@ impl<'a> Reader<'a> {
     }
 
     fn asset(&mut self) -> VlmAsset {
+        self.unclaimed = self.view().and_then(|view| index(view, "byteLength")).unwrap_or(0);
         let text = |key| self.extension.get(key).and_then(Value::as_str).unwrap_or_default().to_owned();
         let settings = self.extension.get("settings").cloned().unwrap_or_default();
         let positions = self.vectors("samples", "positions");
@@ -191,37 +215,49 @@ impl<'a> Reader<'a> {
     /// Tags of the primitives whose triangles differ, in the order of the file.
     fn triangle_tags(&mut self) -> Vec<TriangleTags> {
         let mut all = Vec::new();
-        // No array of ours overlaps another: else a small file could name a large accessor again and again.
-        let mut left = self.view_bytes() / size_of::<u32>();
         for (mesh, primitive, json) in own_of_primitives(self.file) {
             let Some(json) = json.get("triangleTags") else { continue };
             let name = format!("meshes/{mesh}/primitives/{primitive}/triangleTags");
-            let claimed = index(json, "accessor").map_or(0, |accessor| elements(self.file.json(), accessor));
-            let Some(rest) = left.checked_sub(claimed) else {
+            let pointer =
+                format!("/meshes/{mesh}/primitives/{primitive}/extensions/{EXTENSION}/triangleTags");
+            // Those that are compressed claim what they are stored in.
+            let claimed = match index(json, "accessor") {
+                Some(accessor) if json.get(compress::PROPERTY).is_none() => {
+                    elements(self.file.json(), accessor).saturating_mul(size_of::<u32>())
+                }
+                _ => 0,
+            };
+            if !self.claim(claimed) {
                 self.outdated(
                     "asset",
                     format!("another tool altered the file: `{name}` claims more than there is"),
                 );
                 break;
-            };
-            left = rest;
-            let tags = self.integers_at(&Place { json: Some(json), name, vlm: "asset" });
+            }
+            let tags = self.integers_at(&Place { json: Some(json), name, pointer, vlm: "asset" });
             all.push(TriangleTags { mesh, primitive, tags });
         }
         all
     }
 
-    /// Size of the buffer view that holds all arrays.
-    fn view_bytes(&self) -> usize {
-        let view = self.extension.get("data").and_then(|data| index(data, "bufferView"));
-        let view = view.and_then(|view| array(self.file.json(), "/bufferViews").get(view));
-        view.and_then(|view| index(view, "byteLength")).unwrap_or(0)
+    /// Takes bytes of the buffer view for one array; false if so many are not left.
+    fn claim(&mut self, bytes: usize) -> bool {
+        let rest = self.unclaimed.checked_sub(bytes);
+        self.unclaimed = rest.unwrap_or(self.unclaimed);
+        rest.is_some()
+    }
+
+    /// The buffer view that holds all arrays.
+    fn view(&self) -> Option<&'a Value> {
+        let view = index(self.extension.get("data")?, "bufferView")?;
+        array(self.file.json(), "/bufferViews").get(view)
     }
 
     fn place(&self, group: &str, key: &str) -> Place<'a> {
         Place {
             json: self.extension.get(group).and_then(|group| group.get(key)),
             name: format!("{group}/{key}"),
+            pointer: format!("/extensions/{EXTENSION}/{group}/{key}"),
             vlm: if group == "grid" { "grid" } else { "asset" },
         }
     }
@@ -249,34 +285,68 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads an array; absent ones are empty. One that cannot be read, or has another digest, is stale.
-    fn elements<T>(
+    fn elements<T: bytemuck::Pod>(
         &mut self,
         place: &Place<'_>,
         kind: &str,
         read: impl Fn(&GltfFile, usize) -> Result<(Vec<T>, Vec<u8>), Error>,
     ) -> Vec<T> {
-        let Place { json: Some(json), name, vlm } = place else { return Vec::new() };
+        let Place { json: Some(json), name, vlm, .. } = place else { return Vec::new() };
         let accessor = index(json, "accessor").unwrap_or(usize::MAX);
         let altered = format!("accessor {accessor} `{name}` was renumbered or altered by another tool");
-        match read(self.file, accessor) {
+        let found = match json.get(compress::PROPERTY) {
+            None => read(self.file, accessor).map_err(|error| Refusal::Altered(why(error))),
+            Some(codec) => self.decompress(place, codec, kind, accessor),
+        };
+        match found {
             Ok((_, bytes))
                 if self.trust == Trust::Verify
                     && digest::of_array(kind, &bytes) != digest::text(json, "digest") =>
             {
                 self.outdated(vlm, altered);
-                Vec::new()
             }
-            Ok((values, _)) => values,
-            Err(Error::Invalid { issues, .. }) => {
-                let why = issues.first().map(|issue| issue.message.clone()).unwrap_or_default();
-                self.outdated(vlm, format!("{altered} ({why})"));
-                Vec::new()
-            }
-            Err(other) => {
-                self.outdated(vlm, format!("{altered} ({other})"));
-                Vec::new()
-            }
+            Ok((values, _)) => return values,
+            Err(Refusal::Altered(why)) => self.outdated(vlm, format!("{altered} ({why})")),
+            Err(Refusal::Invalid(issue)) => self.invalid.push(issue),
         }
+        Vec::new()
+    }
+
+    /// The values and decoded bytes of a compressed array.
+    fn decompress<T: bytemuck::Pod>(
+        &mut self,
+        place: &Place<'_>,
+        codec: &Value,
+        kind: &str,
+        accessor: usize,
+    ) -> Result<(Vec<T>, Vec<u8>), Refusal> {
+        let pointer = format!("{}/{}", place.pointer, compress::PROPERTY);
+        let (_, components) = layout::columns_and_rows(kind);
+        let element = components * size_of::<u32>() as u64;
+        let codec = Codec::read(codec, element, &pointer).map_err(Refusal::Invalid)?;
+        let stored = self.stored(accessor, codec.byte_length)?;
+        let bytes = codec.decode(&stored, &pointer).map_err(Refusal::Invalid)?;
+        let words: Vec<u32> = bytes.as_chunks().0.iter().map(|&word| u32::from_le_bytes(word)).collect();
+        Ok((from_words(&words), bytes))
+    }
+
+    /// The bytes that a compressed array is stored in. Only bytes that are really in the file justify what they decode to, so the
+    /// accessor has to lie in our own buffer view, which nothing else has compressed.
+    fn stored(&mut self, accessor: usize, length: u64) -> Result<Vec<u8>, Refusal> {
+        let refuse = |message: &str| Err(Refusal::Altered(message.to_owned()));
+        let json = array(self.file.json(), "/accessors").get(accessor).unwrap_or(&Value::Null);
+        let view = self.extension.get("data").and_then(|data| index(data, "bufferView"));
+        let plain = self.view().is_some_and(|view| layout::meshopt(view).is_none());
+        if !plain || index(json, "bufferView") != view || json.get("sparse").is_some() {
+            return refuse("it does not lie in the buffer view of the extension");
+        }
+        if count(json, "count") != Some(length) {
+            return refuse("it has another length");
+        }
+        if !usize::try_from(length).is_ok_and(|length| self.claim(length)) {
+            return refuse("the arrays claim more than there is");
+        }
+        self.file.read_bytes(accessor).map_err(|error| Refusal::Altered(why(error)))
     }
 
     /// Finds the node that bears each VLM.
@@ -367,6 +437,16 @@ fn own_of_primitives(file: &GltfFile) -> impl Iterator<Item = (u32, u32, &Value)
         let primitives = array(mesh, "/primitives").iter().enumerate();
         primitives.filter_map(move |(p, primitive)| Some((m as u32, p as u32, own(primitive)?)))
     })
+}
+
+/// The reason of an error, without the file's name where it is about one place.
+fn why(error: Error) -> String {
+    match error {
+        Error::Invalid { issues, .. } => {
+            issues.into_iter().next().map(|issue| issue.message).unwrap_or_default()
+        }
+        other => other.to_string(),
+    }
 }
 
 /// Structs of whole words, one after the other; a torn one at the end is left out.

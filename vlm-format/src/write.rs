@@ -7,6 +7,7 @@ use serde_json::{Map, Value, json};
 
 use crate::asset::{Sample, VlmAsset};
 use crate::check::array;
+use crate::compress::{self, Codec};
 use crate::container::GltfFile;
 use crate::digest::{self, Source};
 use crate::error::Error;
@@ -14,6 +15,14 @@ use crate::grid::Grid;
 use crate::package::{OutputFile, Parts, Target};
 use crate::strip::{EXTENSION, strip};
 use crate::validate::validate_in;
+
+/// How [`write_vlm_with`] stores an asset.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WriteOptions {
+    /// Compresses every array that this makes smaller, without loss. Only readers that know the property `compression` of arrays can read
+    /// the Virtual Light Meshes then; the rest of the file is as open to all others as without.
+    pub compress: bool,
+}
 
 /// Adds Virtual Light Meshes to a file. Those that it has already are replaced.
 ///
@@ -25,6 +34,19 @@ use crate::validate::validate_in;
 /// [`Error::Asset`] if the asset breaks its invariants or names nodes or primitives that the file lacks;
 /// [`Error::Invalid`] if the geometry cannot be read or the output would be too large.
 pub fn write_vlm(file: &GltfFile, asset: &VlmAsset, target: &Target) -> Result<Vec<OutputFile>, Error> {
+    write_vlm_with(file, asset, target, &WriteOptions::default())
+}
+
+/// Adds Virtual Light Meshes to a file as [`write_vlm`] does, stored as `options` say.
+///
+/// # Errors
+/// As [`write_vlm`].
+pub fn write_vlm_with(
+    file: &GltfFile,
+    asset: &VlmAsset,
+    target: &Target,
+    options: &WriteOptions,
+) -> Result<Vec<OutputFile>, Error> {
     let issues = validate_in(file, asset);
     if !issues.is_empty() {
         return Err(Error::Asset { issues });
@@ -32,7 +54,7 @@ pub fn write_vlm(file: &GltfFile, asset: &VlmAsset, target: &Target) -> Result<V
     let mut parts = Parts::of(file);
     strip(&mut parts);
     parts.convert(file, target);
-    let mut extension = Arrays::new(&parts.json).extension(asset);
+    let mut extension = Arrays::new(&parts.json, options).extension(asset);
     add_digests(&mut extension.json, file, asset)?;
     refer(&mut parts.json, asset, std::mem::take(&mut extension.triangle_tags));
     extension.append_to(&mut parts, target);
@@ -57,6 +79,7 @@ struct Arrays {
     accessors: Vec<Value>,
     first_accessor: usize,
     view: usize,
+    compress: bool,
 }
 
 /// The root object, and the data that it refers to.
@@ -68,12 +91,13 @@ struct Extension {
 }
 
 impl Arrays {
-    fn new(root: &Value) -> Self {
+    fn new(root: &Value, options: &WriteOptions) -> Self {
         Self {
             bytes: Vec::new(),
             accessors: Vec::new(),
             first_accessor: array(root, "/accessors").len(),
             view: array(root, "/bufferViews").len(),
+            compress: options.compress,
         }
     }
 
@@ -93,21 +117,21 @@ impl Arrays {
 
     fn lights(&mut self, asset: &VlmAsset) -> Value {
         let mut json = Map::new();
-        self.vectors(&mut json, "positions", &asset.positions);
-        self.integers(&mut json, "indices", asset.triangles.as_flattened());
-        self.vectors(&mut json, "albedo", &asset.albedo);
-        self.vectors(&mut json, "emission", &asset.emission);
-        self.integers(&mut json, "tags", &asset.tags);
+        self.vectors(&mut json, "lights/positions", &asset.positions);
+        self.integers(&mut json, "lights/indices", asset.triangles.as_flattened());
+        self.vectors(&mut json, "lights/albedo", &asset.albedo);
+        self.vectors(&mut json, "lights/emission", &asset.emission);
+        self.integers(&mut json, "lights/tags", &asset.tags);
         Value::Object(json)
     }
 
     fn samples(&mut self, asset: &VlmAsset) -> Value {
         let column = |part: fn(&Sample) -> Vec3| asset.samples.iter().map(part).collect::<Vec<Vec3>>();
         let mut json = Map::new();
-        self.integers(&mut json, "starts", &asset.sample_starts);
-        self.vectors(&mut json, "positions", &column(|sample| sample.position));
-        self.vectors(&mut json, "normals", &column(|sample| sample.normal));
-        self.vectors(&mut json, "reflectance", &column(|sample| sample.reflectance));
+        self.integers(&mut json, "samples/starts", &asset.sample_starts);
+        self.vectors(&mut json, "samples/positions", &column(|sample| sample.position));
+        self.vectors(&mut json, "samples/normals", &column(|sample| sample.normal));
+        self.vectors(&mut json, "samples/reflectance", &column(|sample| sample.reflectance));
         Value::Object(json)
     }
 
@@ -117,18 +141,18 @@ impl Arrays {
         json.insert(String::from("cellSize"), json!(grid.cell_size));
         json.insert(String::from("dimensions"), json!(grid.dimensions));
         json.insert(String::from("surfaceProbes"), json!(grid.surface_probes));
-        self.integers(&mut json, "cells", &grid.cells);
-        self.integers(&mut json, "leaves", bytemuck::cast_slice(&grid.leaves));
-        self.integers(&mut json, "leafProbes", &grid.leaf_probes);
-        self.integers(&mut json, "nearStarts", &grid.near_starts);
-        self.integers(&mut json, "near", &grid.near);
-        self.scalars(&mut json, "nearFormFactors", &grid.near_form_factors);
-        self.structs(&mut json, "probes", bytemuck::cast_slice(&grid.probes));
-        self.scalars(&mut json, "sampleShares", &grid.sample_shares);
-        self.scalars(&mut json, "surfaceGains", &grid.surface_gains);
-        self.structs(&mut json, "uncovered", bytemuck::cast_slice(&grid.uncovered));
-        self.integers(&mut json, "rowStarts", &grid.row_starts);
-        self.integers(&mut json, "rows", &grid.rows);
+        self.integers(&mut json, "grid/cells", &grid.cells);
+        self.integers(&mut json, "grid/leaves", bytemuck::cast_slice(&grid.leaves));
+        self.integers(&mut json, "grid/leafProbes", &grid.leaf_probes);
+        self.integers(&mut json, "grid/nearStarts", &grid.near_starts);
+        self.integers(&mut json, "grid/near", &grid.near);
+        self.scalars(&mut json, "grid/nearFormFactors", &grid.near_form_factors);
+        self.structs(&mut json, "grid/probes", bytemuck::cast_slice(&grid.probes));
+        self.scalars(&mut json, "grid/sampleShares", &grid.sample_shares);
+        self.scalars(&mut json, "grid/surfaceGains", &grid.surface_gains);
+        self.structs(&mut json, "grid/uncovered", bytemuck::cast_slice(&grid.uncovered));
+        self.integers(&mut json, "grid/rowStarts", &grid.row_starts);
+        self.integers(&mut json, "grid/rows", &grid.rows);
         Value::Object(json)
     }
 
@@ -138,33 +162,33 @@ impl Arrays {
         Value::Object(json)
     }
 
-    fn vectors(&mut self, json: &mut Map<String, Value>, key: &str, values: &[Vec3]) {
+    fn vectors(&mut self, json: &mut Map<String, Value>, name: &str, values: &[Vec3]) {
         let bytes: Vec<u8> =
             values.iter().flat_map(|value| value.to_array()).flat_map(f32::to_le_bytes).collect();
-        self.push(json, key, "VEC3", 5126, values.len(), &bytes);
+        self.push(json, name, "VEC3", 5126, values.len(), &bytes);
     }
 
     /// Structs of vectors of four numbers.
-    fn structs(&mut self, json: &mut Map<String, Value>, key: &str, vectors: &[[f32; 4]]) {
+    fn structs(&mut self, json: &mut Map<String, Value>, name: &str, vectors: &[[f32; 4]]) {
         let bytes: Vec<u8> = vectors.iter().flatten().copied().flat_map(f32::to_le_bytes).collect();
-        self.push(json, key, "VEC4", 5126, vectors.len(), &bytes);
+        self.push(json, name, "VEC4", 5126, vectors.len(), &bytes);
     }
 
-    fn scalars(&mut self, json: &mut Map<String, Value>, key: &str, values: &[f32]) {
+    fn scalars(&mut self, json: &mut Map<String, Value>, name: &str, values: &[f32]) {
         let bytes: Vec<u8> = values.iter().copied().flat_map(f32::to_le_bytes).collect();
-        self.push(json, key, "SCALAR", 5126, values.len(), &bytes);
+        self.push(json, name, "SCALAR", 5126, values.len(), &bytes);
     }
 
-    fn integers(&mut self, json: &mut Map<String, Value>, key: &str, values: &[u32]) {
+    fn integers(&mut self, json: &mut Map<String, Value>, name: &str, values: &[u32]) {
         let bytes: Vec<u8> = values.iter().copied().flat_map(u32::to_le_bytes).collect();
-        self.push(json, key, "SCALAR", 5125, values.len(), &bytes);
+        self.push(json, name, "SCALAR", 5125, values.len(), &bytes);
     }
 
     /// Adds an accessor. An empty array has none: glTF's accessors have one element at least.
     fn push(
         &mut self,
         json: &mut Map<String, Value>,
-        key: &str,
+        name: &str,
         kind: &str,
         component: u32,
         count: usize,
@@ -174,7 +198,19 @@ impl Arrays {
             return;
         }
         let accessor = self.first_accessor + self.accessors.len();
-        json.insert(key.to_owned(), json!({ "accessor": accessor, "digest": digest::of_array(kind, bytes) }));
+        let mut place = json!({ "accessor": accessor, "digest": digest::of_array(kind, bytes) });
+        let compressed = if self.compress { Codec::encode(name, bytes) } else { None };
+        match compressed {
+            Some((codec, encoded)) => {
+                place[compress::PROPERTY] = codec.json();
+                self.store("SCALAR", 5121, encoded.len(), &encoded);
+            }
+            None => self.store(kind, component, count, bytes),
+        }
+        json.insert(name.rsplit('/').next().unwrap_or(name).to_owned(), place);
+    }
+
+    fn store(&mut self, kind: &str, component: u32, count: usize, bytes: &[u8]) {
         self.accessors.push(json!({
             "bufferView": self.view,
             "byteOffset": self.bytes.len(),
@@ -183,6 +219,8 @@ impl Arrays {
             "type": kind,
         }));
         self.bytes.extend_from_slice(bytes);
+        // What is compressed ends anywhere, but numbers of four bytes start at multiples of four.
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
     }
 }
 

@@ -25,6 +25,7 @@ use glam::DVec3;
 use image::ImageError;
 
 use maud::{Markup, html};
+use vlm_format::GltfFile;
 
 use crate::bake::Bake;
 use crate::ground::Ground;
@@ -67,6 +68,8 @@ pub struct Subjects<'a> {
     pub bake: &'a Bake,
     /// Size of all files written, bytes.
     pub file_bytes: u64,
+    /// The file written, if its arrays may be compressed; without one they count as they are in memory.
+    pub written: Option<&'a GltfFile>,
 }
 
 /// The page of a bake, as one HTML document without references to other files.
@@ -114,7 +117,7 @@ pub fn report_html(subjects: &Subjects) -> Result<String, ImageError> {
         objects: object_tables(&objects, &parts),
         tags: tables::tag_table(&evidence, &report.tags),
         grid: tables::grid_table(asset.grid.as_ref()),
-        sizes: tables::size_table(asset, subjects.file_bytes),
+        sizes: tables::size_table(asset, subjects.written, subjects.file_bytes),
         times: tables::time_table(&report.seconds),
         notes: &report.notes,
     };

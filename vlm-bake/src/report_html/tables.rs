@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use maud::{Markup, html};
-use vlm_format::{Grid, VlmAsset};
+use vlm_format::{GltfFile, Grid, VlmAsset};
 
 use super::checked::Checked;
 use super::colour::{css, encode, of_tag};
@@ -286,18 +286,27 @@ fn grid_rows(grid: &GridContent) -> Vec<(String, String)> {
 }
 
 /// What the asset adds to the file, by part.
-pub fn size_table(asset: &VlmAsset, file_bytes: u64) -> Markup {
-    let parts = sizes(asset);
-    let sum: u64 = parts.iter().map(|(_, size)| size).sum();
+pub fn size_table(asset: &VlmAsset, written: Option<&GltfFile>, file_bytes: u64) -> Markup {
+    let parts = sizes(asset, written);
+    let sum = |bytes: fn(&Size) -> u64| parts.iter().map(bytes).sum();
+    let all = Size {
+        part: "all arrays of the VLM".to_owned(),
+        decoded: sum(|p| p.decoded),
+        stored: sum(|p| p.stored),
+    };
+    let figures = |size: &Size| {
+        html! {
+            th scope="row" { (size.part) } td.n { (bytes(size.decoded)) } td.n { (bytes(size.stored)) }
+            td.n { (percent(share(size.stored, file_bytes))) }
+        }
+    };
     html! {
         div.scroll { table.narrow {
-            thead { tr { th { "part" } th.n { "size" } th.n { "share of the file" } } }
+            thead { tr { th { "part" } th.n { "in memory" } th.n { "in the file" } th.n { "share of the file" } } }
             tbody {
-                @for (part, size) in &parts {
-                    tr { th scope="row" { (part) } td.n { (bytes(*size)) } td.n { (percent(share(*size, file_bytes))) } }
-                }
-                tr.sum { th scope="row" { "all arrays of the VLM" } td.n { (bytes(sum)) } td.n { (percent(share(sum, file_bytes))) } }
-                tr { th scope="row" { "the file" } td.n { (bytes(file_bytes)) } td.n {} }
+                @for size in &parts { tr { (figures(size)) } }
+                tr.sum { (figures(&all)) }
+                tr { th scope="row" { "the file" } td.n {} td.n { (bytes(file_bytes)) } td.n {} }
             }
         } }
     }
@@ -307,19 +316,43 @@ fn share(part: u64, whole: u64) -> f64 {
     part as f64 / whole.max(1) as f64
 }
 
-/// Four bytes a number, as `vlm-format` writes them.
-fn sizes(asset: &VlmAsset) -> Vec<(String, u64)> {
+/// A part of an asset.
+struct Size {
+    part: String,
+    /// Bytes in memory.
+    decoded: u64,
+    /// Bytes in the file.
+    stored: u64,
+}
+
+/// The arrays of lights and samples, by part.
+const PARTS: [(&str, &[&str]); 3] = [
+    ("lights: geometry", &["lights/positions", "lights/indices"]),
+    ("lights: colours and tags", &["lights/albedo", "lights/emission", "lights/tags"]),
+    ("samples", &["samples/starts", "samples/positions", "samples/normals", "samples/reflectance"]),
+];
+
+/// Four bytes a number in memory, and in the file what it says.
+fn sizes(asset: &VlmAsset, written: Option<&GltfFile>) -> Vec<Size> {
     let numbers = |vectors: usize, integers: usize| 4 * (3 * vectors + integers) as u64;
-    let lights = numbers(asset.positions.len() + asset.triangles.len(), 0);
-    let colours = numbers(asset.albedo.len() + asset.emission.len(), asset.tags.len());
-    let samples = numbers(3 * asset.samples.len(), asset.sample_starts.len());
-    let mut parts = vec![
-        ("lights: geometry".to_owned(), lights),
-        ("lights: colours and tags".to_owned(), colours),
-        ("samples".to_owned(), samples),
+    let decoded = [
+        numbers(asset.positions.len() + asset.triangles.len(), 0),
+        numbers(asset.albedo.len() + asset.emission.len(), asset.tags.len()),
+        numbers(3 * asset.samples.len(), asset.sample_starts.len()),
     ];
+    let size = |part: String, arrays: &[&str], decoded: u64| {
+        let stored = written.map(|file| arrays.iter().map(|array| file.stored_vlm_bytes(array)).sum());
+        Size { part, decoded, stored: stored.unwrap_or(decoded) }
+    };
+    let mut parts: Vec<Size> = PARTS
+        .iter()
+        .zip(decoded)
+        .map(|(&(part, arrays), bytes)| size(part.to_owned(), arrays, bytes))
+        .collect();
     let grid = asset.grid.as_ref().map(Grid::sizes).into_iter().flatten();
-    parts.extend(grid.map(|(array, bytes)| (format!("grid: {array}"), bytes as u64)));
+    parts.extend(
+        grid.map(|(array, bytes)| size(format!("grid: {array}"), &[&format!("grid/{array}")], bytes as u64)),
+    );
     parts
 }
 

@@ -114,6 +114,51 @@ fn same_bytes_twice_and_with_any_number_of_threads() {
 }
 
 #[test]
+fn compressed_bakes_hold_the_same_in_fewer_bytes_and_say_so() {
+    let folders = Folders::new();
+    let input = repository("assets/cornell.glb");
+    let bake = |name: &str, flags: &[&str]| {
+        let output = folders.output(name);
+        let page = folders.output(&format!("{name}.html"));
+        let fixed = ["bake", &input, "-o", &output, "--preset", "draft", "--report-html", &page];
+        let result = run(fixed.into_iter().chain(flags.iter().copied()));
+        assert!(result.status.success(), "{}", text(&result.stderr));
+        (output, std::fs::read_to_string(page).unwrap())
+    };
+    let (plain, plain_page) = bake("plain.glb", &[]);
+    let (small, small_page) = bake("small.glb", &["--compress"]);
+    let (again, _) = bake("again.glb", &["--compress"]);
+    let bytes = |path: &str| std::fs::read(path).unwrap();
+    assert_eq!(read(&small), read(&plain));
+    assert!(4 * bytes(&small).len() < 3 * bytes(&plain).len(), "{} bytes", bytes(&small).len());
+    assert!(bytes(&again) == bytes(&small), "the second time");
+    assert!(run(["check", &small, "--geometry", &input]).status.success());
+
+    let grid = |path: &str| -> Value {
+        serde_json::from_slice::<Value>(&run(["inspect", path, "--json"]).stdout).unwrap()["grid"].clone()
+    };
+    let (large, small_grid) = (grid(&plain), grid(&small));
+    assert_eq!((&large["bytes"], &large["stored_bytes"]), (&small_grid["bytes"], &large["bytes"]));
+    let (decoded, stored) = (&small_grid["bytes"], &small_grid["stored_bytes"]);
+    assert!(4 * stored.as_u64().unwrap() < 3 * decoded.as_u64().unwrap(), "{stored} of {decoded}");
+    let kilobytes = |bytes: &Value| format!("{:.1} kB", bytes.as_f64().unwrap() / 1e3);
+    let line = format!("{}, {} in the file", kilobytes(decoded), kilobytes(stored));
+    assert!(text(&run(["inspect", &small]).stdout).contains(&line), "{line}");
+
+    let sum = |page: &str| {
+        let row =
+            page.split("all arrays of the VLM").nth(1).unwrap().split("</tr>").next().unwrap().to_owned();
+        row.split("<td class=\"n\">")
+            .skip(1)
+            .map(|c| c.split('<').next().unwrap().to_owned())
+            .collect::<Vec<_>>()
+    };
+    let (large, small) = (sum(&plain_page), sum(&small_page));
+    assert_eq!((&large[0], &large[1]), (&small[0], &large[0]));
+    assert_ne!(small[1], small[0], "in memory and in the file");
+}
+
+#[test]
 fn the_budget_of_lights_is_met() {
     let folders = Folders::new();
     for asked in [120, 460, 2000] {

@@ -37,7 +37,8 @@ fn baked(path: &str, lights: u32) -> (Scene, Bake) {
 }
 
 fn page(scene: &Scene, bake: &Bake) -> String {
-    report_html(&Subjects { title: "cornell.glb", scene, bake, file_bytes: 1_000_000 }).unwrap()
+    report_html(&Subjects { title: "cornell.glb", scene, bake, file_bytes: 1_000_000, written: None })
+        .unwrap()
 }
 
 /// A picture of the page by the start of its title.

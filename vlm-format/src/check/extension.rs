@@ -24,8 +24,9 @@ const NODE: Shape = SomeOf(&[may("vlms", Texts), may("tag", Tag)]);
 /// A primitive that is tagged as a whole or by triangle.
 const PRIMITIVE: Shape = OneField(&[may("tag", Tag), may("triangleTags", ARRAY)]);
 
-/// One array of the extension.
-const ARRAY: Shape = Object(&[must("accessor", ACCESSOR), must("digest", Text)]);
+/// One array of the extension. What is in `compression`, [`crate::compress`] checks when it reads the array.
+const ARRAY: Shape =
+    Object(&[must("accessor", ACCESSOR), must("digest", Text), may("compression", Object(&[]))]);
 
 /// The root object of `VLM_virtual_light_mesh`.
 const ROOT: &[Field] = &[

@@ -7,7 +7,7 @@ use clap::Args;
 use glam::Vec3;
 use serde::Serialize;
 use vlm_bake::grid_content::GridContent;
-use vlm_format::{Settings, VlmAsset, read_vlm_unchecked};
+use vlm_format::{GltfFile, Settings, VlmAsset, read_vlm_unchecked};
 
 use crate::error::CliError;
 use crate::input::open;
@@ -70,15 +70,15 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
             "/extensions: the file has no Virtual Light Mesh; bake it first",
         ));
     };
-    let content = Content::of(file.name(), &asset);
+    let content = Content::of(&file, &asset);
     if args.json { print_json(&content) } else { print(&content.lines()) }
 }
 
 impl Content {
-    fn of(file: &str, asset: &VlmAsset) -> Self {
+    fn of(file: &GltfFile, asset: &VlmAsset) -> Self {
         let tags = asset.tags.iter().copied().filter(|&tag| tag != 0);
         Self {
-            file: file.to_owned(),
+            file: file.name().to_owned(),
             generator: asset.generator.clone(),
             settings: asset.settings.clone(),
             vlms: asset.vlms.iter().map(VlmContent::of).collect(),
@@ -97,7 +97,7 @@ impl Content {
                 .count(),
             partly_tagged_primitives: asset.triangle_tags.len(),
             tagged_nodes: asset.node_tags.len(),
-            grid: asset.grid.as_ref().map(GridContent::of),
+            grid: asset.grid.as_ref().map(|grid| GridContent::of(grid).stored_in(file)),
         }
     }
 

@@ -11,10 +11,11 @@ pub fn lines(grid: &GridContent) -> Vec<String> {
     let levels: Vec<String> = grid.leaves_by_level.iter().map(usize::to_string).collect();
     let mut lines = vec![
         format!(
-            "grid      {x} x {y} x {z} cells of {} m, {} stored; {:.1} kB",
+            "grid      {x} x {y} x {z} cells of {} m, {} stored; {:.1} kB, {:.1} kB in the file",
             grid.cell_size_m,
             grid.stored_cells,
-            kilobytes(grid.bytes)
+            kilobytes(grid.bytes as u64),
+            kilobytes(grid.stored_bytes)
         ),
         format!("leaves    {}; by level, coarsest first: {}", grid.leaves, levels.join(", ")),
         format!(
@@ -26,11 +27,10 @@ pub fn lines(grid: &GridContent) -> Vec<String> {
             grid.near_entries, grid.mean_row, grid.far_entries
         ),
     ];
-    lines.extend(
-        grid.bytes_by_array
-            .iter()
-            .map(|a| format!("bytes     {:<12} {:>9.1} kB", a.array, kilobytes(a.bytes))),
-    );
+    lines.extend(grid.bytes_by_array.iter().map(|array| {
+        let (decoded, stored) = (kilobytes(array.bytes as u64), kilobytes(array.stored_bytes));
+        format!("bytes     {:<15} {decoded:>9.1} kB, {stored:>9.1} kB in the file", array.array)
+    }));
     lines.push("leaves by their probes on surface".to_owned());
     lines.extend(bars(&grid.probes_of_leaves));
     lines.push("leaves by lights that are near for any of their probes".to_owned());
@@ -38,7 +38,7 @@ pub fn lines(grid: &GridContent) -> Vec<String> {
     lines
 }
 
-fn kilobytes(bytes: usize) -> f64 {
+fn kilobytes(bytes: u64) -> f64 {
     bytes as f64 / 1e3
 }
 
