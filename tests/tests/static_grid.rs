@@ -8,11 +8,11 @@ use glam::{Vec2, Vec3};
 use vlm_bake::render::LitScene;
 use vlm_bake::scene::{AuthoredMesh, LoadOptions, Scene, load};
 use vlm_bake::shade::TraceScene;
-use vlm_format::{GltfFile, Probe, VlmAsset};
+use vlm_format::{GltfFile, VlmAsset};
 use vlm_shaders::cpu::gather::Receiver;
 use vlm_shaders::cpu::gather_static::Frame;
 use vlm_shaders::cpu::grid::leaf_at;
-use vlm_tests::rooms::{across, add_room, slab};
+use vlm_tests::rooms::across;
 use vlm_tests::scenes::{add, matte, point_light, quad};
 
 fn baked(scene: &Scene, lights: u32) -> VlmAsset {
@@ -149,31 +149,4 @@ fn no_seam_shows_between_cells() {
     assert!(largest_seam(&stepped, &borders) > 4e-4);
     let jump = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f32::max) / mean(&values);
     assert!(jump < 5e-3, "{jump}");
-}
-
-/// Probes of a floor that is raised by so much for x < 0 which count 5 cm beyond the step, and all of them.
-fn over_a_step(step: f32) -> (usize, usize) {
-    let mut scene = Scene::default();
-    let (low, high) = (Vec3::new(-2.0, 0.0, -2.0), Vec3::new(2.0, 2.5, 2.0));
-    add_room(&mut scene, low, high, &matte(Vec3::splat(0.7)));
-    add(&mut scene, &slab(low, Vec3::new(0.0, step, 2.0)), matte(Vec3::splat(0.7)));
-    scene.lights.push(point_light(Vec3::new(1.0, 1.5, 0.0), 100.0));
-    let grid = baked(&scene, 460).grid.unwrap();
-    let on_floor = |p: &&Probe| p.normal.y > 0.9 && p.position.y < step + 0.01 && p.position.x.abs() > 0.05;
-    let counts_beyond = |p: &&Probe| {
-        let beyond = if p.position.x < 0.0 { Vec3::new(0.05, 0.0, 0.0) } else { Vec3::new(-0.05, step, 0.0) };
-        let places = (-19..20).map(|z| beyond + 0.1 * z as f32 * Vec3::Z);
-        places.into_iter().any(|place| p.place_weight(p.local(place)) > 0.0)
-    };
-    let on_floor: Vec<&Probe> = grid.probes.iter().filter(on_floor).collect();
-    (on_floor.iter().copied().filter(|p| counts_beyond(p)).count(), on_floor.len())
-}
-
-/// Light on the other side of a step is another: a niche in a lit wall is dark.
-#[test]
-fn probes_end_at_steps() {
-    let (over, all) = over_a_step(0.25);
-    assert!(over == 0 && all > 100, "{over} of {all}");
-    let (over, all) = over_a_step(0.005);
-    assert!(over > 10, "the check can fail: {over} of {all} reach over what is no step");
 }

@@ -9,7 +9,7 @@
 //! Receivers that move find **free** probes in the volumes that artists mark, with light from all sides.
 //!
 //! Steps: `uncovered -> stand_in -> pool`, then for a rough grid, from which `refine` learns, and for the final one
-//! `spacing -> reach, steps -> transport, made_lights -> near -> free -> tree`.
+//! `spacing -> reach -> transport, made_lights -> near -> free -> tree`.
 
 mod free;
 mod free_reach;
@@ -21,7 +21,6 @@ mod reach;
 mod refine;
 mod spacing;
 mod stand_in;
-mod steps;
 mod transport;
 mod tree;
 mod uncovered;

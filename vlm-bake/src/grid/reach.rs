@@ -1,4 +1,4 @@
-//! How far around itself a probe counts: to where walls begin, and steps.
+//! How far around itself a probe counts: to where walls begin.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -6,7 +6,6 @@ use vlm_format::Probe;
 
 use super::pool::Place;
 use super::spacing::Spacing;
-use super::steps::steps;
 use crate::shade::TraceScene;
 
 /// Reach along the surface over the spacing. Higher values blend more probes, which smooths their noise and blurs borders.
@@ -37,12 +36,7 @@ pub fn probes(trace: &TraceScene, pool: &[Place], spacing: &Spacing, chosen: &[u
 fn probe(trace: &TraceScene, place: &Place, reach: f32) -> Probe {
     let surface = &place.surface;
     let normal = surface.normal;
-    let height = HEIGHT * reach;
-    let up = free(trace, surface.position, surface.geometric_normal, height);
-    let down = free(trace, surface.position, -surface.geometric_normal, height);
-    let mut walls = walls(trace, place, reach);
-    walls.extend(steps(trace, place, reach, [0.9 * up, height]));
-    walls.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+    let walls = walls(trace, place, reach);
     let tangent = walls.first().map_or_else(
         || normal.any_orthonormal_vector(),
         |wall| {
@@ -57,7 +51,10 @@ fn probe(trace: &TraceScene, place: &Place, reach: f32) -> Probe {
         let side = &mut sides[axis + usize::from(along > 0.0)];
         *side = side.min(along.abs());
     }
+    let height = HEIGHT * reach;
     let least = LEAST * reach;
+    let up = free(trace, surface.position, surface.geometric_normal, height);
+    let down = free(trace, surface.position, -surface.geometric_normal, height);
     Probe {
         position: surface.position,
         row_scale: 0.0,
@@ -70,30 +67,31 @@ fn probe(trace: &TraceScene, place: &Place, reach: f32) -> Probe {
 }
 
 /// What stands in a probe's way along its surface.
-pub(super) struct Wall {
+struct Wall {
     /// From the probe, metres.
-    pub distance: f32,
-    /// Likewise, as a vector.
-    pub at: Vec3,
+    at: Vec3,
     /// The wall's normal.
-    pub facing: Vec3,
+    facing: Vec3,
 }
 
-/// The walls within reach.
+/// The walls within reach, nearest first.
 fn walls(trace: &TraceScene, place: &Place, reach: f32) -> Vec<Wall> {
     let surface = &place.surface;
     let (u, v) = surface.geometric_normal.any_orthonormal_pair();
     let lift = free(trace, surface.position, surface.geometric_normal, LIFT * reach) * 0.9;
     let origin =
         trace.bvh.leave(surface.position + surface.geometric_normal * lift, surface.geometric_normal);
-    let wall = |i: u32| {
-        let (sin, cos) = (std::f32::consts::TAU * (i as f32 + 0.5) / AROUND as f32).sin_cos();
-        let direction = u * cos + v * sin;
-        let hit = trace.path_hit_within(origin, direction, reach * std::f32::consts::SQRT_2)?;
-        let facing = trace.surface(&hit, 0.0)?.geometric_normal;
-        Some(Wall { distance: hit.distance, at: direction * hit.distance, facing })
-    };
-    (0..AROUND).filter_map(wall).collect()
+    let mut walls: Vec<(f32, Wall)> = (0..AROUND)
+        .filter_map(|i| {
+            let (sin, cos) = (std::f32::consts::TAU * (i as f32 + 0.5) / AROUND as f32).sin_cos();
+            let direction = u * cos + v * sin;
+            let hit = trace.path_hit_within(origin, direction, reach * std::f32::consts::SQRT_2)?;
+            let facing = trace.surface(&hit, 0.0)?.geometric_normal;
+            Some((hit.distance, Wall { at: direction * hit.distance, facing }))
+        })
+        .collect();
+    walls.sort_by(|a, b| a.0.total_cmp(&b.0));
+    walls.into_iter().map(|(_, wall)| wall).collect()
 }
 
 /// How far one comes from a surface along a direction, at most `most`.
