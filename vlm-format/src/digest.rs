@@ -11,7 +11,6 @@ use serde_json::Value;
 use crate::check::{array, index};
 use crate::container::GltfFile;
 use crate::error::Error;
-use crate::nodes;
 
 /// Accumulates typed values; every variable-length value is preceded by its length.
 #[derive(Default)]
@@ -67,7 +66,7 @@ pub(crate) struct Source<'a> {
 
 impl<'a> Source<'a> {
     pub(crate) fn new(file: &'a GltfFile) -> Self {
-        let world_from_nodes = nodes::world_from_nodes(file, &nodes::parents(file));
+        let world_from_nodes = file.world_from_nodes();
         Self { file, world_from_nodes, meshes: HashMap::new(), images: HashMap::new() }
     }
 

@@ -35,56 +35,45 @@ pub(crate) fn path(file: &GltfFile, parents: &[Option<usize>], node: usize) -> S
 }
 
 impl GltfFile {
-    /// The global transform of every node at rest, metres. Rotations count as unit quaternions in spite of the file's rounding.
+    /// The global transform of every node at rest, metres, in the precision of the JSON. Rotations count as unit quaternions in spite of the
+    /// file's rounding.
+    ///
+    /// Iterative: chains may be a million nodes long.
     #[must_use]
     pub fn world_from_nodes(&self) -> Vec<DMat4> {
-        world_from(self, &parents(self), |node| parent_from_node(node, unit_quaternion))
+        let (nodes, parents) = (array(self.json(), "/nodes"), parents(self));
+        let mut world: Vec<Option<DMat4>> = vec![None; nodes.len()];
+        let mut chain = Vec::new();
+        for start in 0..nodes.len() {
+            let mut at = Some(start);
+            while let Some(node) = at.filter(|&node| world[node].is_none()) {
+                chain.push(node);
+                at = parents[node];
+            }
+            while let Some(node) = chain.pop() {
+                let world_from_parent =
+                    parents[node].and_then(|parent| world[parent]).unwrap_or(DMat4::IDENTITY);
+                world[node] = Some(world_from_parent * parent_from_node(&nodes[node]));
+            }
+        }
+        world.into_iter().map(Option::unwrap_or_default).collect()
     }
 }
 
-/// The rotation (x, y, z, w), of unit length; no rotation for 0.
-fn unit_quaternion(rotation: DQuat) -> DQuat {
-    if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY }
-}
-
-/// `world_from_node` of every node, with rotations as the file has them, so that digests of it never change.
-pub(crate) fn world_from_nodes(file: &GltfFile, parents: &[Option<usize>]) -> Vec<DMat4> {
-    world_from(file, parents, |node| parent_from_node(node, |rotation| rotation))
-}
-
-/// Iterative: chains may be a million nodes long.
-fn world_from(
-    file: &GltfFile,
-    parents: &[Option<usize>],
-    parent_from_node: impl Fn(&Value) -> DMat4,
-) -> Vec<DMat4> {
-    let nodes = array(file.json(), "/nodes");
-    let mut world: Vec<Option<DMat4>> = vec![None; nodes.len()];
-    let mut chain = Vec::new();
-    for start in 0..nodes.len() {
-        let mut at = Some(start);
-        while let Some(node) = at.filter(|&node| world[node].is_none()) {
-            chain.push(node);
-            at = parents[node];
-        }
-        while let Some(node) = chain.pop() {
-            let world_from_parent = parents[node].and_then(|parent| world[parent]).unwrap_or(DMat4::IDENTITY);
-            world[node] = Some(world_from_parent * parent_from_node(&nodes[node]));
-        }
-    }
-    world.into_iter().map(Option::unwrap_or_default).collect()
-}
-
-/// The node's own transform, in the precision of the JSON.
-fn parent_from_node(node: &Value, rotation_of: impl Fn(DQuat) -> DQuat) -> DMat4 {
+/// The node's own transform.
+fn parent_from_node(node: &Value) -> DMat4 {
     if let Some(matrix) = numbers::<16>(node, "matrix") {
         return DMat4::from_cols_array(&matrix);
     }
     let translation = numbers(node, "translation").map_or(DVec3::ZERO, DVec3::from_array);
-    let rotation = numbers(node, "rotation")
-        .map_or(DQuat::IDENTITY, |rotation| rotation_of(DQuat::from_array(rotation)));
+    let rotation = numbers(node, "rotation").map_or(DQuat::IDENTITY, DQuat::from_array);
     let scale = numbers(node, "scale").map_or(DVec3::ONE, DVec3::from_array);
-    DMat4::from_scale_rotation_translation(scale, rotation, translation)
+    DMat4::from_scale_rotation_translation(scale, unit_quaternion(rotation), translation)
+}
+
+/// The rotation, of unit length; no rotation for 0.
+fn unit_quaternion(rotation: DQuat) -> DQuat {
+    if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY }
 }
 
 /// A list of exactly `N` numbers.
@@ -106,7 +95,7 @@ mod tests {
         let file = GltfFile::from_slice(json.as_bytes(), "tree.gltf", None).unwrap();
         let world = file.world_from_nodes();
         assert!((world[1].w_axis.truncate() - DVec3::new(0.0, 3.0, 0.0)).length() < 1e-12, "{world:?}");
-        let raw = world_from_nodes(&file, &parents(&file));
-        assert!((raw[1].w_axis.truncate() - DVec3::new(0.0, 3.0, 0.0)).length() > 1e-3, "as the file has it");
+        let long = DMat4::from_quat(DQuat::from_xyzw(0.0, 0.0, 0.709, 0.709));
+        assert!((long.transform_vector3(DVec3::X) - DVec3::Y).length() > 1e-3, "as the file has it");
     }
 }

@@ -110,24 +110,25 @@ impl Changes {
 
     /// Takes a frame's visibility; the numbers of the lights for which any of it changed.
     pub(crate) fn see(&mut self, visibility: &[f32]) -> Vec<u32> {
+        if self.visibility.as_deref() == Some(visibility) {
+            return Vec::new();
+        }
         let before = self.visibility.replace(visibility.to_vec());
         let points = self.point_count.max(1);
-        let before = before.unwrap_or_default();
-        let row =
-            |all: &[f32], light: usize| all.get(light * points..(light + 1) * points).map(<[f32]>::to_vec);
+        // Before the first visibility, every point saw every light.
+        let seen = vec![1.0; points];
         let mut changed = Vec::new();
         for (light, now) in visibility.chunks(points).enumerate() {
-            // Before the first visibility, every point saw every light.
-            let then = row(&before, light).unwrap_or_else(|| vec![1.0; now.len()]);
-            let differs = |lit: &LitSpan| {
-                let span = lit.span.first as usize..(lit.span.first + lit.span.count) as usize;
-                then.get(span.clone()) != now.get(span)
-            };
-            if then == now && !before.is_empty() {
+            let known = before.as_deref().and_then(|all| all.get(light * points..(light + 1) * points));
+            if known == Some(now) {
                 continue;
             }
+            let then = known.unwrap_or(&seen);
             changed.push(light as u32);
-            self.spans.iter_mut().filter(|lit| differs(lit)).for_each(|lit| lit.dirty = true);
+            for lit in &mut self.spans {
+                let span = lit.span.first as usize..(lit.span.first + lit.span.count) as usize;
+                lit.dirty |= then.get(span.clone()) != now.get(span);
+            }
         }
         changed
     }

@@ -2,7 +2,7 @@
 
 use super::geometry::{LocalMesh, normal_matrix};
 use super::node::PlacedNode;
-use glam::{DMat4, DVec3, UVec4, Vec3, Vec4};
+use glam::{DMat4, DQuat, DVec3, DVec4, UVec4, Vec3, Vec4};
 use gltf::Semantic;
 use vlm_format::{Error, GltfFile};
 
@@ -146,9 +146,15 @@ pub(super) fn instances(file: &GltfFile, node: &gltf::Node) -> Result<Vec<DMat4>
         let rotation = rotations.as_ref().and_then(|rotations| rotations.get(i)).copied().unwrap_or(Vec4::W);
         DMat4::from_scale_rotation_translation(
             vector(&scales, i, DVec3::ONE),
-            super::node::unit_quaternion(rotation.to_array()),
+            unit_quaternion(rotation.as_dvec4()),
             vector(&translations, i, DVec3::ZERO),
         )
     };
     Ok((0..count).map(matrix).collect())
+}
+
+/// The rotation (x, y, z, w), of unit length in spite of the file's rounding; no rotation for 0.
+fn unit_quaternion(rotation: DVec4) -> DQuat {
+    let rotation = DQuat::from_vec4(rotation);
+    if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY }
 }

@@ -94,7 +94,7 @@ pub enum Error {
 /// # Errors
 /// [`Error`] says which.
 pub fn load(file: &GltfFile, options: &LoadOptions) -> Result<Scene, Error> {
-    let nodes = node::drawn_nodes(file.document());
+    let nodes = node::drawn_nodes(file);
     let mut loader = Loader::new(file, &nodes);
     for (index, placed) in nodes.iter().enumerate() {
         if let Some(mesh) = placed.node.mesh() {

@@ -1,7 +1,7 @@
 //! The node tree: which nodes are drawn, where they stand in the world, and what they are called.
 
-use glam::{DMat4, DQuat, DVec3};
-use gltf::scene::Transform;
+use glam::DMat4;
+use vlm_format::GltfFile;
 
 /// A node of the drawn scene.
 #[derive(Clone)]
@@ -15,7 +15,8 @@ pub(super) struct PlacedNode<'a> {
 /// The nodes of the default scene, else of the first, else (a file without scenes) of the whole file; parents before
 /// children, siblings in the file's order. What KHR_node_visibility hides is left out, with all below it. A node that
 /// is reached twice counts once, so this always ends.
-pub(super) fn drawn_nodes(document: &gltf::Document) -> Vec<PlacedNode<'_>> {
+pub(super) fn drawn_nodes(file: &GltfFile) -> Vec<PlacedNode<'_>> {
+    let (document, world_from_nodes) = (file.document(), file.world_from_nodes());
     let scene = document.default_scene().or_else(|| document.scenes().next());
     let mut pending: Vec<_> = match scene {
         Some(scene) => scene.nodes().map(|node| (node, None)).collect(),
@@ -30,9 +31,7 @@ pub(super) fn drawn_nodes(document: &gltf::Document) -> Vec<PlacedNode<'_>> {
             Some(seen) if !*seen && is_visible(&node) => *seen = true,
             _ => continue,
         }
-        let world_from_parent =
-            parent.and_then(|p: usize| placed.get(p)).map_or(DMat4::IDENTITY, |p| p.world_from_node);
-        let world_from_node = world_from_parent * parent_from_node(&node);
+        let world_from_node = world_from_nodes.get(node.index()).copied().unwrap_or_default();
         let first_child = pending.len();
         pending.extend(node.children().map(|child| (child, Some(placed.len()))));
         pending[first_child..].reverse();
@@ -70,21 +69,4 @@ fn root_nodes(document: &gltf::Document) -> Vec<gltf::Node<'_>> {
         }
     }
     document.nodes().filter(|node| !is_child.get(node.index()).copied().unwrap_or(true)).collect()
-}
-
-fn parent_from_node(node: &gltf::Node) -> DMat4 {
-    match node.transform() {
-        Transform::Matrix { matrix } => glam::Mat4::from_cols_array_2d(&matrix).as_dmat4(),
-        Transform::Decomposed { translation, rotation, scale } => DMat4::from_scale_rotation_translation(
-            DVec3::from_array(scale.map(f64::from)),
-            unit_quaternion(rotation),
-            DVec3::from_array(translation.map(f64::from)),
-        ),
-    }
-}
-
-/// The rotation (x, y, z, w), of unit length in spite of the file's rounding; no rotation for 0.
-pub(super) fn unit_quaternion(rotation: [f32; 4]) -> DQuat {
-    let rotation = DQuat::from_array(rotation.map(f64::from));
-    if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY }
 }

@@ -2,6 +2,7 @@
 
 use insta::assert_snapshot;
 use serde_json::{Value, json};
+use vlm_bake::options::{BakeOptions, Preset};
 
 use crate::support::{Document, Folders, read, repository, run, run_with_input, text, vlm};
 
@@ -195,4 +196,25 @@ fn emissive_materials_become_lights() {
 fn area(asset: &vlm_format::VlmAsset, light: usize) -> f32 {
     let [a, b, c] = asset.triangles[light].map(|v| asset.positions[v as usize]);
     (b - a).cross(c - a).length() / 2.0
+}
+
+/// The help and the README say what the presets do, and the options do it.
+#[test]
+fn presets_are_what_they_are_said_to_be() {
+    let output = run(["bake", "--help"]);
+    let readme = std::fs::read_to_string(repository("README.md")).unwrap();
+    for preset in Preset::ALL {
+        let BakeOptions { samples, grid, .. } = BakeOptions::preset(preset, 100_000);
+        let help = text(&output.stdout);
+        let help = help
+            .lines()
+            .find(|line| line.trim_start().starts_with(&format!("- {}:", preset.name())))
+            .unwrap();
+        assert!(help.ends_with(&format!(", {samples} samples each")), "{help}");
+        let row = readme.lines().find(|line| line.starts_with(&format!("| `{}` |", preset.name()))).unwrap();
+        let told: Vec<&str> = row.split('|').map(str::trim).collect();
+        assert_eq!(told[3], samples.to_string(), "{row}");
+        let probes = told[4].replace(',', "");
+        assert!(probes.ends_with(&format!(" {} {}", grid.rays, grid.near)), "{row}");
+    }
 }

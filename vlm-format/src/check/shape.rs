@@ -79,13 +79,13 @@ struct Walk<'a, 'r> {
 impl Walk<'_, '_> {
     fn value(&mut self, value: &Value, shape: Shape) {
         match shape {
-            Bool => self.expect(value.is_boolean(), value, "true or false"),
-            Text => self.expect(value.is_string(), value, "a text"),
+            Bool => self.require(value.is_boolean(), value, "true or false"),
+            Text => self.require(value.is_string(), value, "a text"),
             Number => self.number(value),
-            Count => self.expect(value.is_u64(), value, "a whole number, 0 or more"),
+            Count => self.require(value.is_u64(), value, "a whole number, 0 or more"),
             Tag => {
                 let fits = value.as_u64().is_some_and(|tag| tag > 0 && u32::try_from(tag).is_ok());
-                self.expect(fits, value, "a tag: a whole number of 32 bits, above 0");
+                self.require(fits, value, "a tag: a whole number of 32 bits, above 0");
             }
             Index(array) => self.index(value, array),
             OneOf(allowed) => self.one_of(value, allowed),
@@ -101,7 +101,7 @@ impl Walk<'_, '_> {
             Small(count) => {
                 let fits = |value: &Value| value.as_u64().is_some_and(|number| u32::try_from(number).is_ok());
                 let list = value.as_array().is_some_and(|list| list.len() == count && list.iter().all(fits));
-                self.expect(list, value, "a list of whole numbers of the right length");
+                self.require(list, value, "a list of whole numbers of the right length");
             }
             Numbers(count) => {
                 if count > 0 && value.as_array().is_some_and(|list| list.len() != count) {
@@ -147,7 +147,7 @@ impl Walk<'_, '_> {
 
     fn list(&mut self, value: &Value, shape: Shape) {
         let Value::Array(list) = value else {
-            return self.expect(false, value, "a list");
+            return self.require(false, value, "a list");
         };
         for (index, value) in list.iter().enumerate() {
             self.inside(&index.to_string(), |walk| walk.value(value, shape));
@@ -159,13 +159,13 @@ impl Walk<'_, '_> {
             Some(number) if !(number as f32).is_finite() => {
                 self.wrong(Code::NumberRange, format!("{number:e} is beyond single precision"));
             }
-            number => self.expect(number.is_some(), value, "a number"),
+            number => self.require(number.is_some(), value, "a number"),
         }
     }
 
     fn index(&mut self, value: &Value, array: &str) {
         let Some(index) = value.as_u64() else {
-            return self.expect(false, value, "a whole number, 0 or more");
+            return self.require(false, value, "a whole number, 0 or more");
         };
         let length = self.root.pointer(array).and_then(Value::as_array).map_or(0, Vec::len);
         if index >= length as u64 {
@@ -189,11 +189,11 @@ impl Walk<'_, '_> {
     }
 
     fn as_object<'v>(&mut self, value: &'v Value) -> Option<&'v Map<String, Value>> {
-        self.expect(value.is_object(), value, "an object");
+        self.require(value.is_object(), value, "an object");
         value.as_object()
     }
 
-    fn expect(&mut self, holds: bool, value: &Value, expected: &str) {
+    fn require(&mut self, holds: bool, value: &Value, expected: &str) {
         if !holds {
             self.wrong(Code::WrongType, format!("{} is not {expected}", shorten(value)));
         }

@@ -11,7 +11,6 @@ use crate::asset::VlmAsset;
 use crate::check::array;
 use crate::container::GltfFile;
 use crate::error::{Code, Issue};
-use crate::nodes;
 
 /// Longest edge over height that a light may have: beyond it, single precision cannot hold its form factor.
 pub const MAX_ASPECT_RATIO: f64 = 100.0;
@@ -62,7 +61,7 @@ fn bearers(file: &GltfFile, asset: &VlmAsset, issues: &mut Issues) {
 }
 
 fn aspect_ratios(file: &GltfFile, asset: &VlmAsset, issues: &mut Issues) {
-    let world_from_nodes = nodes::world_from_nodes(file, &nodes::parents(file));
+    let world_from_nodes = file.world_from_nodes();
     for vlm in &asset.vlms {
         let world_from_node = world_from_nodes.get(vlm.node as usize).copied().unwrap_or_default();
         let corner = |&vertex: &u32| {

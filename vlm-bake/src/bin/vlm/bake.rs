@@ -67,7 +67,7 @@ pub struct BakeArgs {
 enum PresetArg {
     /// A quick look: 5 % of the triangles as lights (120 to 4,000), 2 samples each
     Draft,
-    /// For shipping: 20 % of the triangles (460 to 16,000), 2 samples each
+    /// For shipping: 20 % of the triangles (460 to 16,000), 4 samples each
     Game,
     /// For stills: 80 % of the triangles (1,840 to 64,000), 16 samples each
     Quality,
