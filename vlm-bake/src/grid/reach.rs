@@ -20,6 +20,9 @@ const AROUND: u32 = 32;
 /// They run at this height, over the reach. Lower ones are stopped by smaller steps.
 const LIFT: f32 = 0.12;
 
+/// Walls count as out of reach from this share of it on, for what rounding takes from their distance.
+const OUT: f32 = 0.99;
+
 /// A reach is never below this share of what it would be in the open.
 const LEAST: f32 = 0.02;
 
@@ -47,9 +50,13 @@ fn probe(trace: &TraceScene, place: &Place, reach: f32) -> Probe {
     let mut sides = [reach; 4];
     for wall in &walls {
         let (u, v) = (wall.at.dot(tangent), wall.at.dot(bitangent));
-        let (axis, along) = if u.abs() >= v.abs() { (0, u) } else { (2, v) };
-        let side = &mut sides[axis + usize::from(along > 0.0)];
-        *side = side.min(along.abs());
+        let [side_u, side_v] = [usize::from(u > 0.0), 2 + usize::from(v > 0.0)];
+        // A straight wall that the nearest ray has met is out of reach for all other rays that meet it: it must not cut what runs along it.
+        let is_beyond = |side: usize, along: f32| along.abs() > OUT * sides[side];
+        if !is_beyond(side_u, u) && !is_beyond(side_v, v) {
+            let (side, along) = if u.abs() >= v.abs() { (side_u, u) } else { (side_v, v) };
+            sides[side] = along.abs();
+        }
     }
     let height = HEIGHT * reach;
     let least = LEAST * reach;
