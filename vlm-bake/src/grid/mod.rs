@@ -19,6 +19,7 @@ mod near;
 mod pool;
 mod reach;
 mod refine;
+mod relief;
 mod spacing;
 mod stand_in;
 mod transport;

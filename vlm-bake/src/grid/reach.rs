@@ -5,14 +5,22 @@ use rayon::prelude::*;
 use vlm_format::Probe;
 
 use super::pool::Place;
+use super::relief::relief;
 use super::spacing::Spacing;
 use crate::shade::TraceScene;
 
 /// Reach along the surface over the spacing. Higher values blend more probes, which smooths their noise and blurs borders.
 const REACH: f32 = 1.45;
 
-/// Reach along the normal over that along the surface. Higher values blend over rounder edges and steps.
+/// The most reach along the normal over that along the surface. Higher values blend over rounder edges.
 const HEIGHT: f32 = 0.5;
+
+/// The least reach along the normal over that along the surface, for surface that is flat. Higher values blend over higher steps, and give
+/// niches the light of the wall before them.
+const FLAT: f32 = 0.1;
+
+/// Reach along the normal over how far the surface rises or falls. Higher values blend curved surface more evenly.
+const RELIEF: f32 = 2.0;
 
 /// Rays along the surface.
 const AROUND: u32 = 32;
@@ -62,13 +70,15 @@ fn probe(trace: &TraceScene, place: &Place, reach: f32) -> Probe {
     let least = LEAST * reach;
     let up = free(trace, surface.position, surface.geometric_normal, height);
     let down = free(trace, surface.position, -surface.geometric_normal, height);
+    let [rise, fall] = relief(trace, place, reach, [up, down]);
+    let along_normal = |free: f32, relief: f32| free.min((RELIEF * relief).max(FLAT * reach)).max(least);
     Probe {
         position: surface.position,
         row_scale: 0.0,
         normal,
-        reach_up: up.max(least),
+        reach_up: along_normal(up, rise),
         tangent,
-        reach_down: down.max(least),
+        reach_down: along_normal(down, fall),
         reach: sides.map(|side| side.max(least)),
     }
 }
