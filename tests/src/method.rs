@@ -17,6 +17,9 @@ use vlm_bake::scene::Camera;
 use vlm_bake::shade::TraceScene;
 use vlm_format::VlmAsset;
 
+use crate::device::processor;
+use crate::gpu::GpuError;
+
 /// One way to find indirect light, at one setting of its knobs. One file each under `methods/`, one line in
 /// [`crate::methods::ALL`].
 pub trait Method: Sync {
@@ -59,10 +62,15 @@ pub trait Prepared {
     fn area_lights(&self) -> Option<Arc<Baked>> {
         None
     }
+
+    /// The processor or graphics card, in its driver's words.
+    fn device(&self) -> String {
+        processor()
+    }
 }
 
 /// Where a method runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Backend {
     /// The processor.
     Cpu,
@@ -138,6 +146,21 @@ pub enum MethodError {
     /// No picture could be made.
     #[error(transparent)]
     Render(#[from] RenderError),
+    /// The graphics card is missing, or cannot hold the scene.
+    #[error("{0}")]
+    Gpu(String),
+}
+
+impl From<vlm_runtime::Error> for MethodError {
+    fn from(error: vlm_runtime::Error) -> Self {
+        Self::Gpu(error.to_string())
+    }
+}
+
+impl From<GpuError> for MethodError {
+    fn from(error: GpuError) -> Self {
+        Self::Gpu(error.to_string())
+    }
 }
 
 /// A scene on which methods are compared, with what several of them need.

@@ -12,6 +12,9 @@ use wgpu::{Device, Queue, Texture, TextureFormat, TextureUsages, TextureView};
 /// Distance at which the reversed depth is 1, metres.
 const NEAR: f64 = 0.01;
 
+/// Distance at which the reversed depth of an orthographic camera is 0, metres.
+const FAR: f64 = 100.0;
+
 /// A device with an asset loaded.
 pub struct Host {
     /// The device.
@@ -29,7 +32,8 @@ pub struct Pictures {
     normal: TextureView,
     geometric_normal: TextureView,
     tag: TextureView,
-    irradiance: Texture,
+    /// What the deferred gather writes.
+    pub irradiance: Texture,
 }
 
 impl Host {
@@ -174,18 +178,30 @@ fn create(
     })
 }
 
-/// Of a perspective camera, with reversed depth that ends at infinity.
+/// With reversed depth: that of a perspective camera ends at infinity, that of an orthographic one [`FAR`] away.
 #[must_use]
 pub fn clip_from_world(camera: &Camera, gbuffer: &GBuffer) -> DMat4 {
-    let Projection::Perspective(angle) = camera.projection else { return DMat4::NAN };
-    let up = 1.0 / (0.5 * f64::from(angle)).tan();
-    let right = up * f64::from(gbuffer.height) / f64::from(gbuffer.width);
-    let clip_from_view = DMat4::from_cols_array_2d(&[
-        [right, 0.0, 0.0, 0.0],
-        [0.0, up, 0.0, 0.0],
-        [0.0, 0.0, 0.0, -1.0],
-        [0.0, 0.0, NEAR, 0.0],
-    ]);
+    let aspect = f64::from(gbuffer.height) / f64::from(gbuffer.width);
+    let clip_from_view = match camera.projection {
+        Projection::Perspective(angle) => {
+            let up = 1.0 / (0.5 * f64::from(angle)).tan();
+            DMat4::from_cols_array_2d(&[
+                [up * aspect, 0.0, 0.0, 0.0],
+                [0.0, up, 0.0, 0.0],
+                [0.0, 0.0, 0.0, -1.0],
+                [0.0, 0.0, NEAR, 0.0],
+            ])
+        }
+        Projection::Orthographic(half_height) => {
+            let up = 1.0 / f64::from(half_height);
+            DMat4::from_cols_array_2d(&[
+                [up * aspect, 0.0, 0.0, 0.0],
+                [0.0, up, 0.0, 0.0],
+                [0.0, 0.0, 1.0 / FAR, 0.0],
+                [0.0, 0.0, 1.0, 1.0],
+            ])
+        }
+    };
     clip_from_view * camera.world_from_view.inverse()
 }
 

@@ -18,6 +18,7 @@
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
+use vlm_tests::method::Backend;
 use vlm_tests::pareto::report::read_rows;
 use vlm_tests::pareto::row::Row;
 use vlm_tests::pareto::run::{RunOptions, run};
@@ -150,6 +151,7 @@ fn counts_and_errors_are_as_expected() {
         out: folder.path().join("run"),
         size: Some((32, 32)),
         repeats: 2,
+        backend: Backend::Cpu,
         methods: None,
         cache: folder.path().join("truth"),
         spp: Spp { first: 256, most: 256 },

@@ -15,8 +15,13 @@ pub const ENTRY: Entry =
     Entry { name: "brute", sweep, proof: || Box::new(Brute { lights: 4000 }), tolerance: 0.02 };
 
 fn sweep(stage: &Stage<'_>) -> Vec<Box<dyn Method>> {
+    settings(stage).into_iter().map(|brute| Box::new(brute) as Box<dyn Method>).collect()
+}
+
+/// A quarter of the lights of `game`, as many, and four times as many.
+pub(super) fn settings(stage: &Stage<'_>) -> Vec<Brute> {
     let game = stage.budget(Preset::Game);
-    [game / 4, game, 4 * game].map(|lights| Box::new(Brute { lights }) as Box<dyn Method>).into()
+    [game / 4, game, 4 * game].map(|lights| Brute { lights }).into()
 }
 
 /// The method at one setting.

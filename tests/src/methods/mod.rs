@@ -7,8 +7,9 @@ pub mod thesis;
 pub mod vlm;
 pub mod instant_radiosity;
 pub mod ddgi;
+pub mod gpu;
 
-use crate::method::{Method, Stage};
+use crate::method::{Backend, Method, Stage};
 
 /// A method as the comparison knows it.
 pub struct Entry {
@@ -22,6 +23,15 @@ pub struct Entry {
     pub tolerance: f64,
 }
 
-/// Every method there is.
+/// The methods that run on a backend.
+#[must_use]
+pub fn all(backend: Backend) -> &'static [Entry] {
+    match backend {
+        Backend::Cpu => &ALL,
+        Backend::Gpu => &gpu::ALL,
+    }
+}
+
+/// Every method there is on the processor.
 pub const ALL: [Entry; 6] =
     [direct::ENTRY, brute::ENTRY, thesis::ENTRY, vlm::ENTRY, instant_radiosity::ENTRY, ddgi::ENTRY];

@@ -13,26 +13,28 @@ use crate::method::{Baked, Cost, Method, MethodError, Picture, Prepared, Stage, 
 use crate::thesis::{ThesisGrid, ThesisOptions, gather};
 
 /// The method's line in the table. The proof's range reaches everything, and its list holds everything.
-pub const ENTRY: Entry = Entry {
-    name: "thesis",
-    sweep,
-    proof: || {
-        let options = ThesisOptions { range: 1e4, list: 8192, grid: 1 };
-        Box::new(Thesis { lights: 4000, options })
-    },
-    tolerance: 0.02,
-};
+pub const ENTRY: Entry = Entry { name: "thesis", sweep, proof: || Box::new(whole()), tolerance: 0.02 };
 
 /// Cells along each axis, as the thesis' middle setting.
 const GRID: u32 = 32;
 
 fn sweep(stage: &Stage<'_>) -> Vec<Box<dyn Method>> {
-    let mut methods: Vec<Box<dyn Method>> = Vec::new();
+    settings(stage).into_iter().map(|thesis| Box::new(thesis) as Box<dyn Method>).collect()
+}
+
+/// One list per cell that holds all lights.
+pub(super) fn whole() -> Thesis {
+    Thesis { lights: 4000, options: ThesisOptions { range: 1e4, list: 8192, grid: 1 } }
+}
+
+/// Two numbers of lights, two lengths of lists, three ranges.
+pub(super) fn settings(stage: &Stage<'_>) -> Vec<Thesis> {
+    let mut methods = Vec::new();
     for preset in [Preset::Draft, Preset::Game] {
         for list in [64, 512] {
             for range in [1.5, 4.5, 8.0] {
                 let options = ThesisOptions { range, list, grid: GRID };
-                methods.push(Box::new(Thesis { lights: stage.budget(preset), options }));
+                methods.push(Thesis { lights: stage.budget(preset), options });
             }
         }
     }

@@ -11,22 +11,25 @@ use super::area_lights::AreaLights;
 use crate::method::{Baked, Cost, Method, MethodError, Picture, Prepared, Stage, View};
 
 /// The method's line in the table.
-pub const ENTRY: Entry = Entry {
-    name: "vlm",
-    sweep,
-    proof: || Box::new(Vlm { preset: Preset::Game, lights: 4000, probes: 1.0 }),
-    tolerance: 0.02,
-};
+pub const ENTRY: Entry = Entry { name: "vlm", sweep, proof: || Box::new(whole()), tolerance: 0.02 };
+
+fn sweep(stage: &Stage<'_>) -> Vec<Box<dyn Method>> {
+    settings(stage).into_iter().map(|vlm| Box::new(vlm) as Box<dyn Method>).collect()
+}
+
+/// Lights enough for the proof.
+pub(super) fn whole() -> Vlm {
+    Vlm { preset: Preset::Game, lights: 4000, probes: 1.0 }
+}
 
 /// The three presets as they ship; then `game` with half and twice the probes, and with a quarter and four times of everything.
-fn sweep(stage: &Stage<'_>) -> Vec<Box<dyn Method>> {
+pub(super) fn settings(stage: &Stage<'_>) -> Vec<Vlm> {
     let as_shipped = |preset: Preset| Vlm { preset, lights: stage.budget(preset), probes: 1.0 };
     let game = || as_shipped(Preset::Game);
-    let mut methods: Vec<Box<dyn Method>> =
-        Preset::ALL.map(|preset| Box::new(as_shipped(preset)) as Box<dyn Method>).into();
-    methods.extend([0.5, 2.0].map(|probes| Box::new(Vlm { probes, ..game() }) as Box<dyn Method>));
-    methods.push(Box::new(Vlm { lights: game().lights / 4, probes: 0.25, ..game() }));
-    methods.push(Box::new(Vlm { lights: game().lights * 4, probes: 4.0, ..game() }));
+    let mut methods: Vec<Vlm> = Preset::ALL.map(as_shipped).into();
+    methods.extend([0.5, 2.0].map(|probes| Vlm { probes, ..game() }));
+    methods.push(Vlm { lights: game().lights / 4, probes: 0.25, ..game() });
+    methods.push(Vlm { lights: game().lights * 4, probes: 4.0, ..game() });
     methods
 }
 
@@ -41,7 +44,8 @@ pub struct Vlm {
 }
 
 impl Vlm {
-    fn options(&self, stage: &Stage<'_>) -> BakeOptions {
+    /// The options of the bake.
+    pub(super) fn options(&self, stage: &Stage<'_>) -> BakeOptions {
         let mut options = stage.options(self.preset, self.lights);
         options.grid.probes = (f64::from(options.grid.probes) * self.probes) as u32;
         options
@@ -76,15 +80,20 @@ impl Prepared for PreparedVlm {
     }
 
     fn cost(&self) -> Cost {
-        let baked = &self.lights.baked;
-        let grid = baked.asset.grid.as_ref();
-        Cost {
-            prepare_seconds: baked.lights_seconds + baked.grid_seconds,
-            bytes: self.lights.bytes() + grid.map_or(0, |grid| grid.byte_len() as u64),
-        }
+        cost(&self.lights)
     }
 
     fn area_lights(&self) -> Option<Arc<Baked>> {
         Some(Arc::clone(&self.lights.baked))
+    }
+}
+
+/// What lights and grid take.
+pub(super) fn cost(lights: &AreaLights) -> Cost {
+    let baked = &lights.baked;
+    let grid = baked.asset.grid.as_ref();
+    Cost {
+        prepare_seconds: baked.lights_seconds + baked.grid_seconds,
+        bytes: lights.bytes() + grid.map_or(0, |grid| grid.byte_len() as u64),
     }
 }

@@ -8,7 +8,6 @@ use glam::Vec3;
 use super::names::file_name;
 use super::row::Row;
 use super::run::{Contestant, RunError, RunOptions, create_folder, failed};
-use crate::device::processor;
 use crate::exact::ExactPixels;
 use crate::exr;
 use crate::method::{MethodError, Picture, View};
@@ -113,7 +112,7 @@ impl Judge<'_> {
             method: method.name().to_owned(),
             knob: method.knob(),
             backend: method.backends().first().map_or("", |backend| backend.name()).to_owned(),
-            device: processor(),
+            device: contestant.prepared.device(),
             lights: picture.lights,
             pairs: picture.pairs,
             rays: picture.rays,

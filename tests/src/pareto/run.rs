@@ -12,8 +12,8 @@ use vlm_format::GltfFile;
 use super::judge::Judge;
 use super::row::Row;
 use super::scene;
-use crate::method::{Cost, Method, MethodError, Picture, Prepared, Stage, View};
-use crate::methods::{ALL, Entry};
+use crate::method::{Backend, Cost, Method, MethodError, Picture, Prepared, Stage, View};
+use crate::methods::{Entry, all};
 use crate::proof::{Refusal, prove};
 use crate::random;
 use crate::truth::{Spp, TruthError, Truths};
@@ -29,6 +29,8 @@ pub struct RunOptions {
     pub size: Option<(u32, u32)>,
     /// At least 2: the change from frame to frame needs two. More give steadier medians; time grows in proportion.
     pub repeats: u32,
+    /// Where all methods run.
+    pub backend: Backend,
     /// Names of methods; `None` for all.
     pub methods: Option<Vec<String>>,
     /// Folder of the truth's cache.
@@ -123,7 +125,7 @@ pub enum RunError {
 /// # Errors
 /// Whatever keeps the run from being whole; a method that fails its proof is left out instead.
 pub fn run(options: &RunOptions, log: &dyn Fn(&str)) -> Result<Outcome, RunError> {
-    let entries = chosen(options.methods.as_deref())?;
+    let entries = chosen(options.backend, options.methods.as_deref())?;
     let files = options
         .scenes
         .iter()
@@ -143,12 +145,13 @@ pub fn run(options: &RunOptions, log: &dyn Fn(&str)) -> Result<Outcome, RunError
     Ok(outcome)
 }
 
-fn chosen(names: Option<&[String]>) -> Result<Vec<&'static Entry>, RunError> {
-    let Some(names) = names else { return Ok(ALL.iter().collect()) };
+fn chosen(backend: Backend, names: Option<&[String]>) -> Result<Vec<&'static Entry>, RunError> {
+    let all = all(backend);
+    let Some(names) = names else { return Ok(all.iter().collect()) };
     let find = |name: &String| {
-        let known = || ALL.map(|entry| entry.name).join(", ");
+        let known = || all.iter().map(|entry| entry.name).collect::<Vec<_>>().join(", ");
         // `vlm-bench render` and the rows spell names differently.
-        let found = ALL.iter().find(|entry| entry.name == name.replace('-', "_"));
+        let found = all.iter().find(|entry| entry.name == name.replace('-', "_"));
         found.ok_or_else(|| RunError::UnknownMethod { wanted: name.clone(), known: known() })
     };
     names.iter().map(find).collect()
@@ -277,7 +280,7 @@ mod tests {
 
     #[test]
     fn methods_are_known_by_either_spelling() {
-        let of = |name: &str| chosen(Some(&[name.to_owned()])).map(|entries| entries[0].name);
+        let of = |name: &str| chosen(Backend::Cpu, Some(&[name.to_owned()])).map(|entries| entries[0].name);
         for name in ["instant_radiosity", "instant-radiosity"] {
             assert_eq!(of(name).unwrap(), "instant_radiosity");
         }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
+use vlm_tests::method::Backend;
 use vlm_tests::pareto;
 use vlm_tests::pareto::run::{RunOptions, run};
 use vlm_tests::truth::Spp;
@@ -26,6 +27,9 @@ pub struct ParetoArgs {
     /// Times that everything is rendered, 2 or more
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = two_or_more)]
     repeats: u32,
+    /// Where the methods run
+    #[arg(long, value_enum, default_value = "cpu")]
+    backend: Backend,
     /// Methods, separated by commas [default: all]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     methods: Option<Vec<String>>,
@@ -51,6 +55,7 @@ pub fn command(args: &ParetoArgs) -> Result<ExitCode, Box<dyn Error>> {
         out: args.out.clone(),
         size: args.size,
         repeats: args.repeats,
+        backend: args.backend,
         methods: args.methods.clone(),
         cache: args.cache.clone(),
         spp: Spp { first: 1024.min(args.spp), most: args.spp },
