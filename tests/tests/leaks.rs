@@ -108,9 +108,9 @@ fn a_door_that_is_ajar_passes_as_much_as_in_truth() {
     let dark = across(Vec2::new(0.5, -1.9), Vec2::new(3.9, 1.9), 24);
     let leak = leak("door ajar", &scene, 1000, [&lit, &dark]);
     assert!(leak.truth > 1e-3 && leak.truth < 0.2, "{}", leak.truth);
-    assert!(leak.off() < 0.22, "{}", leak.off());
-    assert!(leak.error < 0.6, "{}", leak.error);
-    assert!(leak.leaky_off() > 0.22 && leak.leaky_error > 0.6, "the negative control");
+    assert!(leak.off() < 0.2, "{}", leak.off());
+    assert!(leak.error < 0.5, "{}", leak.error);
+    assert!(leak.leaky_off() > 0.2 && leak.leaky_error > 0.5, "the negative control");
 }
 
 /// A room of 4 x 3 x 4 m with a lamp, cd.
@@ -130,12 +130,10 @@ fn the_floor_behind_a_pillar_is_as_dark_as_in_truth() {
     let dark = across(Vec2::new(0.2, -0.12), Vec2::new(0.5, 0.12), 16);
     let leak = leak("pillar", &scene, 1000, [&lit, &dark]);
     assert!(leak.truth < 0.8, "{}", leak.truth);
-    // It comes out a third too bright. The shadow is 0.3 m wide, and a pixel in it blends probes that reach up to 0.36 m, some of which lie
-    // where the wall by the lamp is seen past the pillar: light is too bright by half at the shadow's edges, by a tenth in its middle. Of 3,000
-    // probes the shadow is 18 % too bright, of 48,000 13 %, with 16,000 lights 9 %; near lights do nothing, and rays nothing for the better.
-    assert!(leak.off() < 0.36, "{}", leak.off());
-    assert!(leak.error < 0.29, "{}", leak.error);
-    assert!(leak.leaky_off() > 0.36 && leak.leaky_error > 0.29, "the negative control");
+    // The shadow is 0.3 m wide, and a pixel in it blends probes that reach as far: light is too bright at its edges.
+    assert!(leak.off() < 0.08, "{}", leak.off());
+    assert!(leak.error < 0.17, "{}", leak.error);
+    assert!(leak.leaky_off() > 0.08 && leak.leaky_error > 0.17, "the negative control");
 }
 
 #[test]

@@ -70,12 +70,12 @@ impl BakeOptions {
     #[must_use]
     pub fn preset(preset: Preset, visible_triangles: usize) -> Self {
         let lights = preset.lights(visible_triangles);
-        let (samples, probes_per_light, rays, near) = match preset {
-            Preset::Draft => (2, 1.5, 256, 0),
-            Preset::Game => (4, 3.0, 512, 16),
-            Preset::Quality => (16, 2.0, 2048, 40),
+        let (samples, probes_per_light, fewest_probes, rays, near) = match preset {
+            Preset::Draft => (2, 1.5, 500, 256, 0),
+            Preset::Game => (4, 3.25, 2_000, 512, 16),
+            Preset::Quality => (16, 2.0, 4_000, 2048, 40),
         };
-        let probes = (f64::from(lights) * probes_per_light) as u32;
+        let probes = ((f64::from(lights) * probes_per_light) as u32).max(fewest_probes);
         Self {
             preset,
             lights,

@@ -99,9 +99,12 @@ pub fn grid(input: &GridInput, options: &GridOptions, progress: &dyn Progress) -
         rays: (options.rays as f32 * ROUGH_RAYS) as u32,
         ..*options
     };
-    let rough = built(input, &pool, bounds, &rough, Pass::Rough, progress)?;
-    refine::refine(input, &mut pool, &rough);
-    built(input, &pool, bounds, options, Pass::Final, progress)
+    let found = built(input, &pool, bounds, &rough, Pass::Rough, progress)?;
+    refine::refine(input, &mut pool, &found);
+    // How many more probes than asked for it takes to cover all surface, the rough grid tells.
+    let excess = found.probes.len() as f32 / rough.probes.max(1) as f32;
+    let probes = options.probes as f32 / excess.clamp(0.5, 2.0);
+    built(input, &pool, bounds, &GridOptions { probes: probes as u32, ..*options }, Pass::Final, progress)
 }
 
 /// Share of the probes for the grid that tells where probes should lie closer. More of them find smaller places.

@@ -10,14 +10,14 @@ use super::spacing::Spacing;
 use crate::shade::TraceScene;
 
 /// Reach along the surface over the spacing. Higher values blend more probes, which smooths their noise and blurs borders.
-const REACH: f32 = 1.45;
+const REACH: f32 = 1.35;
 
 /// The most reach along the normal over that along the surface. Higher values blend over rounder edges.
 const HEIGHT: f32 = 0.5;
 
 /// The least reach along the normal over that along the surface, for surface that is flat. Higher values blend over higher steps, and give
 /// niches the light of the wall before them.
-const FLAT: f32 = 0.1;
+const FLAT: f32 = 0.06;
 
 /// Reach along the normal over how far the surface rises or falls. Higher values blend curved surface more evenly.
 const RELIEF: f32 = 2.0;

@@ -31,7 +31,11 @@ const SHRINK: f32 = 0.25;
 /// Spacing grows by at most this factor, since what was not found may be there all the same.
 const GROW: f32 = 1.6;
 
-/// Errors below this share of the mean light do not count.
+/// Errors are relative to the light at their place, or where it is dark to at least about this share of the mean. Lower values give dark rooms
+/// more of the probes, and bright ones fewer.
+const DARKEST: f32 = 0.1;
+
+/// Errors below this share of the light do not count.
 const NEGLIGIBLE: f32 = 0.01;
 
 /// Point lights that are tried, beside the scene's own and two suns.
@@ -81,7 +85,7 @@ fn lightings(input: &GridInput, pool: &[Place]) -> Vec<Vec<PunctualLight>> {
     all
 }
 
-/// Adds the squared error of the grid over the squared mean light, less what noise alone would make.
+/// Adds the squared error of the grid over the squared light there, less what noise alone would make.
 fn add_errors(
     input: &GridInput,
     grid: &Grid,
@@ -99,8 +103,10 @@ fn add_errors(
     let arrived = refresh(grid, input.lights, &far_sources(input.lights, input.uncovered), &radiosity);
     let frame = Frame { grid, lights: input.lights, arrived: &arrived };
     squared.par_iter_mut().zip(places).zip(&exact).for_each(|((squared, place), exact)| {
-        let error = luminance(frame.gather(&place.surface.receiver(0)).irradiance) - exact.irradiance;
-        *squared += (error * error - exact.variance).max(0.0) / (mean * mean);
+        let gathered = luminance(frame.gather(&place.surface.receiver(0)).irradiance);
+        let error = gathered - exact.irradiance;
+        let there = gathered.max(exact.irradiance) * (1.0 - DARKEST) + mean * DARKEST;
+        *squared += (error * error - exact.variance).max(0.0) / (there * there);
     });
 }
 

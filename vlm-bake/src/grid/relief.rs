@@ -13,7 +13,7 @@ const STATIONS: u32 = 8;
 
 /// A change of height by more than this share of the reach, beyond what the slope explains, is a step. Lower values take roundings for
 /// steps, and leave uneven surface to more, smaller probes.
-const STEP: f32 = 0.06;
+const STEP: f32 = 0.04;
 
 /// Surface whose normal is farther off (cosine) is another: it shares no probes anyway.
 const STEEPEST: f32 = 0.5;
