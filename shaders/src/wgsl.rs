@@ -24,6 +24,9 @@ pub const GATHER_STATIC: &str = include_str!("../wgsl/shared/gather_static.wgsl"
 /// The rows of probes; after [`GRID`].
 const ROWS: &str = include_str!("../wgsl/shared/rows.wgsl");
 
+/// A point that phase 1 lights.
+const POINT: &str = include_str!("../wgsl/shared/point.wgsl");
+
 /// A point that is lit.
 const RECEIVER: &str = include_str!("../wgsl/shared/receiver.wgsl");
 
@@ -49,7 +52,14 @@ pub fn form_factor_sums() -> String {
 /// The direct light at the points that phase 1 lights; entry point `direct`, 64 invocations per workgroup, one per span of points.
 #[must_use]
 pub fn direct() -> String {
-    format!("{}\n{}", include_str!("../wgsl/shared/punctual.wgsl"), include_str!("../wgsl/direct.wgsl"))
+    [include_str!("../wgsl/shared/punctual.wgsl"), POINT, include_str!("../wgsl/direct.wgsl")].join("\n")
+}
+
+/// The share of a light that the points of phase 1 see by one of its shadow maps; entry point `shadow`, 64 invocations per workgroup, one per
+/// point.
+#[must_use]
+pub fn shadow() -> String {
+    [POINT, include_str!("../wgsl/shared/shadow_map.wgsl"), include_str!("../wgsl/shadow.wgsl")].join("\n")
 }
 
 /// Phase 1: the radiosity of lights and sources; entry point `inject`, 64 invocations per workgroup, one per light and one per piece
@@ -177,6 +187,7 @@ pub fn all() -> Vec<(&'static str, String)> {
     let mut all = vec![
         ("form_factor_cases", form_factor_cases()),
         ("form_factor_sums", form_factor_sums()),
+        ("shadow", shadow()),
         ("direct", direct()),
         ("inject", inject()),
         ("refresh", refresh()),

@@ -6,6 +6,7 @@ use vlm_bake::scene::{Camera, Projection};
 use vlm_bake::shade::{SurfacePoint, TraceScene};
 use vlm_runtime::{
     Error, Frame, FrameStats, Point, PunctualLight, Settings, Targets, View, VlmAsset, VlmRenderer,
+    request_device_with,
 };
 use wgpu::{Device, Queue, Texture, TextureFormat, TextureUsages, TextureView};
 
@@ -33,12 +34,12 @@ pub struct Pictures {
 }
 
 impl Host {
-    /// The first Vulkan adapter.
+    /// The first Vulkan adapter, with timestamps where it has them.
     ///
     /// # Errors
     /// Where there is none, or the asset does not fit it.
     pub fn new(asset: &VlmAsset, settings: Settings) -> Result<Self, Error> {
-        let (device, queue) = vlm_runtime::request_device(wgpu::Backends::VULKAN)?;
+        let (device, queue) = request_device_with(wgpu::Backends::VULKAN, wgpu::Features::TIMESTAMP_QUERY)?;
         let mut renderer = VlmRenderer::new(&device, settings)?;
         renderer.load(asset)?;
         Ok(Self { device, queue, renderer, format: settings.format.texture_format() })

@@ -22,6 +22,16 @@ struct LitSpan {
     dirty: bool,
 }
 
+/// Where the visibility comes from.
+enum Seen {
+    /// Every point sees every light.
+    All,
+    /// From the host.
+    Given(Vec<f32>),
+    /// From shadow maps of so many lights, on the device.
+    Maps(usize),
+}
+
 /// What the last frame was lit by, and what changed since.
 pub(crate) struct Changes {
     /// Those that reflect something, by their points.
@@ -31,7 +41,7 @@ pub(crate) struct Changes {
     /// Lights that reflect nothing.
     black: u32,
     lights: Vec<PunctualLight>,
-    visibility: Option<Vec<f32>>,
+    seen: Seen,
     point_count: usize,
 }
 
@@ -66,7 +76,7 @@ impl Changes {
             light_count: set.len() as u32,
             black,
             lights: Vec::new(),
-            visibility: None,
+            seen: Seen::All,
             point_count: points.len(),
         }
     }
@@ -110,11 +120,18 @@ impl Changes {
 
     /// Takes a frame's visibility; the numbers of the lights for which any of it changed.
     pub(crate) fn see(&mut self, visibility: &[f32]) -> Vec<u32> {
-        if self.visibility.as_deref() == Some(visibility) {
+        if matches!(&self.seen, Seen::Given(before) if before == visibility) {
             return Vec::new();
         }
-        let before = self.visibility.replace(visibility.to_vec());
         let points = self.point_count.max(1);
+        let before = match std::mem::replace(&mut self.seen, Seen::Given(visibility.to_vec())) {
+            Seen::All => None,
+            Seen::Given(before) => Some(before),
+            Seen::Maps(_) => {
+                self.spans.iter_mut().for_each(|lit| lit.dirty = true);
+                return (0..visibility.len().div_ceil(points) as u32).collect();
+            }
+        };
         // Before the first visibility, every point saw every light.
         let seen = vec![1.0; points];
         let mut changed = Vec::new();
@@ -133,14 +150,31 @@ impl Changes {
         changed
     }
 
+    /// The visibility of this frame's lights comes from shadow maps, and that of these lights changes.
+    pub(crate) fn map(&mut self, changed: &[u32]) {
+        if matches!(self.seen, Seen::Given(_)) {
+            self.spans.iter_mut().for_each(|lit| lit.dirty = true);
+        }
+        self.seen = Seen::Maps(self.lights.len());
+        let changed: Vec<&PunctualLight> =
+            changed.iter().filter_map(|&light| self.lights.get(light as usize)).collect();
+        for lit in &mut self.spans {
+            lit.dirty |= changed.iter().any(|light| lit.is_reached(light));
+        }
+    }
+
     /// Whether visibility was ever given.
     pub(crate) fn has_visibility(&self) -> bool {
-        self.visibility.is_some()
+        !matches!(self.seen, Seen::All)
     }
 
     /// Numbers of visibility as it was last given.
     pub(crate) fn visibility_len(&self) -> usize {
-        self.visibility.as_ref().map_or(0, Vec::len)
+        match &self.seen {
+            Seen::All => 0,
+            Seen::Given(visibility) => visibility.len(),
+            Seen::Maps(lights) => lights * self.point_count,
+        }
     }
 
     /// The points of some lights moved.

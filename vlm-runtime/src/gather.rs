@@ -3,14 +3,14 @@
 use vlm_shaders::cpu::view::View;
 use vlm_shaders::wgsl::Gathering;
 use wgpu::{
-    BindGroup, BindGroupLayout, BindingType, Buffer, CommandEncoder, ComputePipeline, Device, Queue,
-    TextureFormat, TextureView,
+    BindGroup, BindGroupLayout, BindingType, Buffer, ComputePipeline, Device, Queue, TextureFormat,
+    TextureView,
 };
 
 use crate::direct::write;
 use crate::error::{Error, within};
 use crate::frame::{IrradianceFormat, Settings, Targets};
-use crate::pass::{self, Buffers, dispatch, group, layout, storage, uniform};
+use crate::pass::{self, Buffers, Passes, group, layout, storage, uniform};
 use crate::upload::Uploaded;
 
 /// Pixels of a workgroup along x and y, as in the shader.
@@ -66,18 +66,18 @@ impl Gather {
 
     pub(crate) fn record(
         &self,
-        encoder: &mut CommandEncoder,
+        passes: &mut Passes<'_>,
         device: &Device,
         common: &BindGroup,
         targets: &Targets<'_>,
     ) {
         let [width, height] = size(targets.irradiance);
         if let Some(pairs) = &self.pair_count {
-            encoder.clear_buffer(pairs, 0, None);
+            passes.clear(pairs);
         }
         let group = self.bind(device, targets);
         let tiles = [width.div_ceil(TILE), height.div_ceil(TILE)];
-        dispatch(encoder, "gather", &self.pipeline, &[common, &self.scene_group, &group], tiles);
+        passes.add("gather", &self.pipeline, &[common, &self.scene_group, &group], tiles);
     }
 
     /// Every texture has the size of the irradiance and a format that can be read.
@@ -128,12 +128,7 @@ fn scene(device: &Device, uploaded: &Uploaded, gathering: Gathering) -> (BindGro
 }
 
 fn target_bindings(gathering: Gathering, counted: bool, format: TextureFormat) -> Vec<(u32, BindingType)> {
-    let texture = |sample_type| BindingType::Texture {
-        sample_type,
-        view_dimension: wgpu::TextureViewDimension::D2,
-        multisampled: false,
-    };
-    let float = texture(wgpu::TextureSampleType::Float { filterable: false });
+    let float = float_texture();
     let written = BindingType::StorageTexture {
         access: wgpu::StorageTextureAccess::WriteOnly,
         format,
@@ -147,6 +142,15 @@ fn target_bindings(gathering: Gathering, counted: bool, format: TextureFormat) -
         bindings.push((6, storage(false)));
     }
     bindings
+}
+
+/// A texture of numbers that is not filtered: depth formats too.
+pub(crate) fn float_texture() -> BindingType {
+    texture(wgpu::TextureSampleType::Float { filterable: false })
+}
+
+fn texture(sample_type: wgpu::TextureSampleType) -> BindingType {
+    BindingType::Texture { sample_type, view_dimension: wgpu::TextureViewDimension::D2, multisampled: false }
 }
 
 /// Reads as tag 0 everywhere.
@@ -194,7 +198,7 @@ fn size(view: &TextureView) -> [u32; 2] {
     [view.texture().width(), view.texture().height()]
 }
 
-fn check_format(what: &'static str, view: &TextureView) -> Result<(), Error> {
+pub(crate) fn check_format(what: &'static str, view: &TextureView) -> Result<(), Error> {
     let format = view.texture().format();
     let sampled = format.sample_type(Some(wgpu::TextureAspect::All), None);
     let sampled = sampled.or_else(|| format.sample_type(Some(wgpu::TextureAspect::DepthOnly), None));

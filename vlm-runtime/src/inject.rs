@@ -1,10 +1,10 @@
 //! inject: phase 1, from the direct light at the points to the radiosity of lights and of the grid's sources.
 
 use vlm_shaders::wgsl;
-use wgpu::{BindGroup, BindGroupLayout, CommandEncoder, ComputePipeline, Device};
+use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, Device};
 
 use crate::error::Error;
-use crate::pass::{self, dispatch, group, layout, storage, workgroups};
+use crate::pass::{self, Passes, group, layout, storage, workgroups};
 use crate::upload::Uploaded;
 
 /// The pass for any asset.
@@ -48,7 +48,7 @@ impl Inject {
         Ok(Self { group, workgroups: workgroups(device, "inject", elements)? })
     }
 
-    pub(crate) fn record(&self, encoder: &mut CommandEncoder, pipeline: &InjectPipeline, common: &BindGroup) {
-        dispatch(encoder, "inject", &pipeline.pipeline, &[common, &self.group], [self.workgroups, 1]);
+    pub(crate) fn record(&self, passes: &mut Passes<'_>, pipeline: &InjectPipeline, common: &BindGroup) {
+        passes.add("inject", &pipeline.pipeline, &[common, &self.group], [self.workgroups, 1]);
     }
 }

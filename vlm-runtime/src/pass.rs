@@ -4,6 +4,7 @@ use wgpu::util::DeviceExt as _;
 use wgpu::{BindGroup, BindGroupLayout, BindingType, Buffer, BufferUsages, ComputePipeline, Device};
 
 use crate::error::{Error, within};
+use crate::timer::Timer;
 
 /// Invocations per workgroup of the passes over lights and probes, as in the shaders.
 const WORKGROUP: u32 = 64;
@@ -115,8 +116,18 @@ impl Buffers<'_> {
 
     fn filled(&mut self, label: &str, contents: &[u8], usage: BufferUsages) -> Result<Buffer, Error> {
         let contents = if contents.is_empty() { &[0; LEAST_BYTES as usize] } else { contents };
-        self.check(label, contents.len() as u64)?;
         self.bytes += contents.len() as u64;
+        self.contents(label, contents, usage)
+    }
+
+    /// A buffer with contents, not empty, whose bytes are not counted.
+    pub(crate) fn contents(
+        &self,
+        label: &str,
+        contents: &[u8],
+        usage: BufferUsages,
+    ) -> Result<Buffer, Error> {
+        self.check(label, contents.len() as u64)?;
         let usage = usage | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         let label = Some(label);
         Ok(self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label, contents, usage }))
@@ -154,17 +165,60 @@ pub(crate) fn workgroups(device: &Device, what: &str, elements: usize) -> Result
     Ok(u32::try_from(groups).unwrap_or(u32::MAX))
 }
 
-/// Adds one dispatch.
-pub(crate) fn dispatch(
-    encoder: &mut wgpu::CommandEncoder,
-    label: &str,
-    pipeline: &ComputePipeline,
-    groups: &[&BindGroup],
-    [x, y]: [u32; 2],
-) {
-    let descriptor = wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes: None };
-    let mut pass = encoder.begin_compute_pass(&descriptor);
-    pass.set_pipeline(pipeline);
-    (0..).zip(groups).for_each(|(number, group)| pass.set_bind_group(number, *group, &[]));
-    pass.dispatch_workgroups(x, y, 1);
+/// The passes of a frame, as they are added to an encoder.
+pub(crate) struct Passes<'a> {
+    encoder: &'a mut wgpu::CommandEncoder,
+    timer: Option<&'a mut Timer>,
+    /// Of this frame, in order.
+    pub names: Vec<&'static str>,
+}
+
+impl<'a> Passes<'a> {
+    pub(crate) fn new(encoder: &'a mut wgpu::CommandEncoder, timer: Option<&'a mut Timer>) -> Self {
+        Self { encoder, timer, names: Vec::new() }
+    }
+
+    /// Adds a pass of one dispatch.
+    pub(crate) fn add(
+        &mut self,
+        name: &'static str,
+        pipeline: &ComputePipeline,
+        groups: &[&BindGroup],
+        workgroups: [u32; 2],
+    ) {
+        self.add_each(name, pipeline, &[groups], workgroups);
+    }
+
+    /// Adds a pass of a dispatch for each of several lists of groups, one after the other.
+    pub(crate) fn add_each(
+        &mut self,
+        name: &'static str,
+        pipeline: &ComputePipeline,
+        dispatches: &[&[&BindGroup]],
+        [x, y]: [u32; 2],
+    ) {
+        let timestamp_writes = self.timer.as_ref().and_then(|timer| timer.writes(self.names.len()));
+        let descriptor = wgpu::ComputePassDescriptor { label: Some(name), timestamp_writes };
+        let mut pass = self.encoder.begin_compute_pass(&descriptor);
+        pass.set_pipeline(pipeline);
+        for groups in dispatches {
+            (0..).zip(*groups).for_each(|(number, group)| pass.set_bind_group(number, *group, &[]));
+            pass.dispatch_workgroups(x, y, 1);
+        }
+        drop(pass);
+        self.names.push(name);
+    }
+
+    /// Sets a buffer to zeros.
+    pub(crate) fn clear(&mut self, buffer: &Buffer) {
+        self.encoder.clear_buffer(buffer, 0, None);
+    }
+
+    /// Sends the times back; the names of the passes.
+    pub(crate) fn finish(self, frame: u64) -> Vec<&'static str> {
+        if let Some(timer) = self.timer {
+            timer.finish(self.encoder, frame, &self.names);
+        }
+        self.names
+    }
 }

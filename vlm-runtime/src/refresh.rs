@@ -1,10 +1,10 @@
 //! refresh: what arrives at the probes of an asset with a grid.
 
 use vlm_shaders::wgsl;
-use wgpu::{BindGroup, BindGroupLayout, CommandEncoder, ComputePipeline, Device};
+use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, Device};
 
 use crate::error::Error;
-use crate::pass::{self, dispatch, group, layout, storage, workgroups};
+use crate::pass::{self, Passes, group, layout, storage, workgroups};
 use crate::upload::{GridBuffers, Uploaded};
 
 /// The pass for an asset.
@@ -40,7 +40,7 @@ impl Refresh {
         })
     }
 
-    pub(crate) fn record(&self, encoder: &mut CommandEncoder, common: &BindGroup) {
-        dispatch(encoder, "refresh", &self.pipeline, &[common, &self.group], [self.workgroups, 1]);
+    pub(crate) fn record(&self, passes: &mut Passes<'_>, common: &BindGroup) {
+        passes.add("refresh", &self.pipeline, &[common, &self.group], [self.workgroups, 1]);
     }
 }

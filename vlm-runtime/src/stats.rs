@@ -5,7 +5,9 @@ use serde::Serialize;
 /// What a frame took.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FrameStats {
-    /// The passes that ran, in order: `direct`, `inject`, `refresh`, `gather`.
+    /// The frame's number since loading, from 1.
+    pub frame: u64,
+    /// The passes that ran, in order: `shadow`, `direct`, `inject`, `refresh`, `gather`.
     pub passes: Vec<&'static str>,
     /// Lights of the asset.
     pub lights: u32,
@@ -13,6 +15,8 @@ pub struct FrameStats {
     pub lights_injected: u32,
     /// Lights whose direct light was not.
     pub lights_skipped: Skipped,
+    /// Shadow maps that were read, since they changed.
+    pub shadow_maps: u32,
     /// Pairs of a pixel and a light whose geometry was read; by [`crate::VlmRenderer::pairs_evaluated`].
     pub pairs_evaluated: Option<u64>,
     /// Written to the device since the frame before, loading included.
@@ -21,6 +25,27 @@ pub struct FrameStats {
     pub uses_grid: bool,
     /// Tags are looked at.
     pub uses_tags: bool,
+    /// The times of the newest frame that the device has told about, mostly a frame or two ago; `None` before the first, without
+    /// [`crate::Settings::time_passes`], and on devices without `TIMESTAMP_QUERY`.
+    pub times: Option<FrameTimes>,
+}
+
+/// How long the passes of a frame took on the device.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct FrameTimes {
+    /// [`FrameStats::frame`].
+    pub frame: u64,
+    /// In order.
+    pub passes: Vec<PassTime>,
+}
+
+/// How long a pass took on the device.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PassTime {
+    /// As in [`FrameStats::passes`].
+    pub pass: &'static str,
+    /// Between the timestamps of its beginning and its end, seconds. Software devices tell the wall's time; where passes overlap, so do these.
+    pub seconds: f64,
 }
 
 /// Lights whose direct light was not found anew, by reason.
