@@ -105,7 +105,11 @@ fn the_grid() {
         light_count,
         sample_count,
         uncovered_count,
-        light_tags
+        light_tags,
+        summed,
+        injected,
+        refreshed,
+        padding
     );
     let leaf = layout_of!(Leaf, 0, probes, free_probes);
     for source in [wgsl::inject(), wgsl::refresh(), wgsl::gather_static()] {

@@ -1,4 +1,5 @@
-// What arrives at the probes, from the radiosity of the sources; one invocation per probe. After shared/grid.wgsl,
+// What arrives at the probes, from the radiosity of the sources; one invocation per probe, or per probe of
+// `refreshed`. After shared/grid.wgsl,
 // shared/blend.wgsl, shared/far.wgsl and shared/rows.wgsl; mirror: src/cpu/refresh.rs.
 //
 // Runs again only where lights changed. Every probe writes its own far light and its own near lights, so invocations share nothing.
@@ -13,7 +14,7 @@ const LEAST_COSINE: f32 = 0.2;
 
 @compute @workgroup_size(64)
 fn refresh(@builtin(global_invocation_id) id: vec3u) {
-    let probe = id.x;
+    let probe = listed(header.refreshed, id.x);
     if probe >= header.probe_count {
         return;
     }

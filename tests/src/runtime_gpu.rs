@@ -30,6 +30,8 @@ pub struct Pictures {
     normal: TextureView,
     geometric_normal: TextureView,
     tag: TextureView,
+    /// Not 0 where the surface moves; none by default.
+    pub moving: Option<TextureView>,
     irradiance: Texture,
 }
 
@@ -67,6 +69,7 @@ impl Host {
                 bytemuck::cast_slice(&geometric_normal),
             ),
             tag: self.texture(size, TextureFormat::R32Uint, bytemuck::cast_slice(&tags)),
+            moving: None,
             irradiance: self.target(size, self.format),
         }
     }
@@ -152,6 +155,7 @@ impl Pictures {
             normal: &self.normal,
             geometric_normal: Some(&self.geometric_normal),
             tag: Some(&self.tag),
+            moving: self.moving.as_ref(),
             irradiance,
         }
     }

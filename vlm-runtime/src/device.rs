@@ -45,7 +45,7 @@ pub fn check_limits(limits: &wgpu::Limits) -> Result<(), Error> {
         (
             "the gather",
             "max_sampled_textures_per_shader_stage",
-            4,
+            5,
             limits.max_sampled_textures_per_shader_stage,
         ),
         (

@@ -147,6 +147,10 @@ pub struct Targets<'a> {
     /// Tags of the surface (see [`vlm_format::VlmAsset::tag_of`]) in red; an integer format. Untagged without. Not read by assets without
     /// tags, or where all light comes through a grid, whose probes know the tags.
     pub tag: Option<&'a wgpu::TextureView>,
+    /// What moves, not 0 in red; an integer format. Such pixels get light from the grid's probes in free space, where the file has boxes of them
+    /// (`extras.vlm.volume` on a mesh), since probes on surface know nothing of what is not surface. Nothing moves without. Not read by assets
+    /// without such probes.
+    pub moving: Option<&'a wgpu::TextureView>,
     /// Out, of the format of [`Settings::format`] with `STORAGE_BINDING`: irradiance in lx times [`View::exposure`].
     pub irradiance: &'a wgpu::TextureView,
 }

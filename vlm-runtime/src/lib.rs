@@ -19,6 +19,7 @@ mod changes;
 mod shadow;
 mod direct;
 mod inject;
+mod dependents;
 mod refresh;
 mod gather;
 mod loaded;

@@ -36,7 +36,7 @@ pub(crate) struct Loaded {
     pub(crate) changes: Changes,
     /// Nodes that are not at rest.
     pub(crate) moved: Vec<MovedNode>,
-    /// The radiosity of lights is to be found anew.
+    /// The radiosity of all lights is to be found anew.
     pub(crate) is_stale: bool,
     pub(crate) is_prepared: bool,
     pub(crate) stats: FrameStats,
@@ -99,7 +99,6 @@ impl Loaded {
             Visibility::Maps(maps) => self.take_maps(queue, buffers, pipelines, (frame.lights, maps))?,
         };
         let spans = self.changes.dirty();
-        self.is_stale |= !spans.is_empty();
         let header = (frame.lights.len(), self.changes.has_visibility());
         Ok(bytes + self.direct.write_spans(queue, buffers.device, &spans, header)?)
     }
@@ -121,6 +120,20 @@ impl Loaded {
         let (changed, bytes) = self.shadow.take(queue, (buffers, shadow), bound, frame, points)?;
         self.changes.map(&changed);
         Ok(bytes)
+    }
+
+    /// Says what of phase 1 is to be done again: nothing, what the dirty points reach, or all; bytes written.
+    pub(crate) fn plan(&mut self, queue: &Queue) -> u64 {
+        let elements = self.changes.dirty_elements();
+        let is_whole = self.is_stale || 2 * elements.len() > self.inject.work.total();
+        let elements = (!is_whole).then_some(&elements[..]);
+        let indices = &self.uploaded.indices;
+        let mut bytes = self.inject.work.plan(queue, indices, elements);
+        if let Some(refresh) = &mut self.refresh {
+            let probes = elements.and_then(|elements| refresh.dependents.of(elements));
+            bytes += refresh.work.plan(queue, indices, probes.as_deref());
+        }
+        bytes
     }
 
     /// Moves the lights of nodes that are elsewhere than in the last frame; bytes written.
@@ -192,13 +205,14 @@ impl Loaded {
             }
         }
         write(queue, &self.uploaded.light_surfaces, 0, &surfaces)
-            + write(queue, &self.uploaded.listed, 0, &list_words(listed))
+            + write(queue, &self.uploaded.indices, self.host.header.summed as usize, &list_words(listed))
     }
 
     /// The numbers of this frame; those of the next begin at 0.
     pub(crate) fn take_stats(&mut self) -> FrameStats {
         let (lights_injected, lights_skipped) = self.changes.counts();
         self.changes.clean();
+        self.is_stale = false;
         self.stats.frame += 1;
         let stats = FrameStats { lights_injected, lights_skipped, ..self.stats.clone() };
         self.stats.bytes_uploaded = 0;

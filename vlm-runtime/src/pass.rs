@@ -1,10 +1,13 @@
 //! Layouts, pipelines and buffers, with the limits that they keep.
 
 use wgpu::util::DeviceExt as _;
-use wgpu::{BindGroup, BindGroupLayout, BindingType, Buffer, BufferUsages, ComputePipeline, Device};
+use wgpu::{BindGroup, BindGroupLayout, BindingType, Buffer, BufferUsages, ComputePipeline, Device, Queue};
 
+use crate::direct::write;
 use crate::error::{Error, within};
 use crate::timer::Timer;
+use crate::upload::list_words;
+use vlm_shaders::tables::ALL;
 
 /// Invocations per workgroup of the passes over lights and probes, as in the shaders.
 const WORKGROUP: u32 = 64;
@@ -150,6 +153,61 @@ impl Buffers<'_> {
         within(&what, "max_buffer_size", size, limits.max_buffer_size)?;
         within(&what, "max_storage_buffer_binding_size", size, limits.max_storage_buffer_binding_size)
     }
+}
+
+/// A list of what a pass works on, at a place of `indices`: as `listed` in the shaders reads it.
+pub(crate) struct Worklist {
+    /// Where it begins.
+    start: u32,
+    /// All that there are.
+    total: usize,
+    /// How long the list on the device is, or [`ALL`].
+    on_device: u32,
+    /// How many the next pass works on; 0 for no pass.
+    planned: usize,
+}
+
+impl Worklist {
+    pub(crate) fn new(start: u32, total: usize) -> Self {
+        Self { start, total, on_device: ALL, planned: 0 }
+    }
+
+    /// The next pass works on these, or on all; bytes written.
+    pub(crate) fn plan(&mut self, queue: &Queue, indices: &Buffer, list: Option<&[u32]>) -> u64 {
+        self.planned = list.map_or(self.total, <[u32]>::len);
+        let Some(list) = list else {
+            if self.on_device == ALL {
+                return 0;
+            }
+            self.on_device = ALL;
+            return write(queue, indices, self.start as usize, &[ALL]);
+        };
+        if list.is_empty() {
+            return 0;
+        }
+        self.on_device = list.len() as u32;
+        write(queue, indices, self.start as usize, &list_words(list))
+    }
+
+    /// How many the next pass works on, once.
+    pub(crate) fn take(&mut self) -> usize {
+        std::mem::take(&mut self.planned)
+    }
+
+    /// All that there are.
+    pub(crate) fn total(&self) -> usize {
+        self.total
+    }
+
+    /// Whether the next pass works on all.
+    pub(crate) fn is_all(&self) -> bool {
+        self.on_device == ALL
+    }
+}
+
+/// How many workgroups of a pass these elements take, which fit the device all together.
+pub(crate) fn some_workgroups(elements: usize) -> u32 {
+    u32::try_from((elements as u64).div_ceil(u64::from(WORKGROUP))).unwrap_or(u32::MAX)
 }
 
 /// How many workgroups a pass of one invocation per element takes.

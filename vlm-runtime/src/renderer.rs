@@ -7,6 +7,7 @@ use vlm_shaders::wgsl::Gathering;
 use wgpu::{BindGroup, BindGroupLayout, CommandEncoder, Device, Queue};
 
 use crate::changes::Changes;
+use crate::dependents::Dependents;
 use crate::device::check_limits;
 use crate::direct::{Direct, DirectPipeline};
 use crate::error::Error;
@@ -72,16 +73,16 @@ impl VlmRenderer {
         let pieces: Vec<Vec3> = grid.map_or_else(Vec::new, reflectances);
         let changes = Changes::new(&asset.lights, &pieces, &host.points);
         let (points, spans) = (host.points.len(), changes.span_count());
-        let elements = asset.lights.len() + pieces.len();
         let gathering = self.gathering(asset, grid);
         let refresh = uploaded.grid.as_ref().zip(grid).map(|(buffers, grid)| {
-            Refresh::new(&self.device, &self.common, &uploaded, buffers, grid.probes.len())
+            let dependents = Dependents::new(grid, &asset.lights);
+            Refresh::new(&self.device, &self.common, &uploaded, buffers, (&host.header, dependents))
         });
         let mut loaded = Loaded {
             common: group(&self.device, "common", &self.common, &header),
             shadow: Shadow::default(),
             direct: Direct::new(&self.direct, buffers, &uploaded, points, spans)?,
-            inject: Inject::new(&self.device, &self.inject, &uploaded, elements)?,
+            inject: Inject::new(&self.device, &self.inject, &uploaded, &host.header)?,
             refresh: refresh.transpose()?,
             gather: Gather::new(buffers, &self.common, &uploaded, gathering, &self.settings)?,
             asset: asset.clone(),
@@ -98,6 +99,8 @@ impl VlmRenderer {
             bytes_uploaded: buffers.bytes,
             uses_grid: gathering.grid,
             uses_tags: gathering.tags,
+            uses_free_probes: gathering.free,
+            probes: grid.map_or(0, |grid| grid.probes.len() as u32),
             ..FrameStats::default()
         };
         self.loaded = Some(loaded);
@@ -107,7 +110,8 @@ impl VlmRenderer {
     fn gathering(&self, asset: &VlmAsset, grid: Option<&Grid>) -> Gathering {
         let listed = grid.is_none() || self.settings.moving_nodes;
         let tags = listed && asset.lights.tags.iter().any(|tag| *tag != 0);
-        Gathering { grid: grid.is_some(), listed, tags }
+        let free = grid.is_some_and(|grid| grid.probes.len() > grid.surface_probes as usize);
+        Gathering { grid: grid.is_some(), listed, tags, free }
     }
 
     /// The points for which [`Visibility`] is given, world space: the lights' samples, then surface without a light.
@@ -133,6 +137,7 @@ impl VlmRenderer {
         }
         let mut bytes = loaded.move_nodes(queue, frame.moved)?;
         bytes += loaded.write_direct(queue, &buffers, (&self.shadow, &self.direct), frame)?;
+        bytes += loaded.plan(queue);
         bytes += loaded.gather.write_view(queue, frame.view);
         loaded.stats.bytes_uploaded += bytes;
         loaded.is_prepared = true;
@@ -174,11 +179,9 @@ impl VlmRenderer {
         let mut passes = Passes::new(encoder, self.timer.as_mut());
         stats.shadow_maps = loaded.shadow.record(&mut passes, &self.shadow);
         loaded.direct.record(&mut passes, &self.direct);
-        if std::mem::take(&mut loaded.is_stale) {
-            loaded.inject.record(&mut passes, &self.inject, &loaded.common);
-            if let Some(refresh) = &loaded.refresh {
-                refresh.record(&mut passes, &loaded.common);
-            }
+        loaded.inject.record(&mut passes, &self.inject, &loaded.common);
+        if let Some(refresh) = &mut loaded.refresh {
+            stats.probes_refreshed = refresh.record(&mut passes, &loaded.common);
         }
         if let Some(targets) = targets {
             loaded.gather.record(&mut passes, &self.device, &loaded.common, targets);
@@ -188,7 +191,8 @@ impl VlmRenderer {
     }
 
     /// The WGSL function `indirect(position, normal, geometric_normal, tag) -> Gathered` for a forward shader, which binds
-    /// [`VlmRenderer::forward_groups`] at `first_group` and the next. `Gathered.irradiance` is in lx.
+    /// [`VlmRenderer::forward_groups`] at `first_group` and the next; and `indirect_moving` of the same parameters for what moves, as
+    /// [`Targets::moving`] says. `Gathered.irradiance` is in lx.
     ///
     /// # Errors
     /// [`Error::NotLoaded`].
