@@ -39,9 +39,19 @@ impl Baked {
     /// # Errors
     /// [`BakedError`].
     pub fn open(path: &Path, preset: Preset) -> Result<Self, BakedError> {
+        Self::with_lights(path, preset, 0)
+    }
+
+    /// [`Baked::open`] with so many lights; 0 for the preset's own.
+    ///
+    /// # Errors
+    /// [`BakedError`].
+    pub fn with_lights(path: &Path, preset: Preset, lights: u32) -> Result<Self, BakedError> {
         let file = GltfFile::open(path)?;
         let scene = load(&file, &LoadOptions::default())?;
         let options = BakeOptions::preset(preset, scene.triangles.len());
+        let lights = if lights == 0 { options.lights } else { lights };
+        let options = BakeOptions { lights, ..options };
         let asset = bake(&scene, &options, &Silent)?.asset;
         let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         Ok(Self { name, scene, asset: VlmAsset::new(asset, file.world_from_nodes()) })

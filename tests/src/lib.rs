@@ -35,3 +35,4 @@ pub mod bake_bench;
 pub mod breakdown;
 pub mod clearance_bench;
 pub mod shadow_bench;
+pub mod frame_bench;

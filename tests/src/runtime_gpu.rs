@@ -99,15 +99,32 @@ impl Host {
     /// # Errors
     /// Those of the renderer.
     pub fn frame(&mut self, frame: &Frame, pictures: &Pictures) -> Result<(Vec<Vec3>, FrameStats), Error> {
-        self.renderer.prepare(&self.queue, frame)?;
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let irradiance = pictures.irradiance.create_view(&wgpu::TextureViewDescriptor::default());
-        let targets = pictures.targets(&irradiance);
-        let mut stats = self.renderer.record(&mut encoder, &targets)?;
-        self.queue.submit([encoder.finish()]);
+        let mut stats = self.draw(frame, pictures)?;
         stats.pairs_evaluated = self.renderer.pairs_evaluated(&self.queue).ok();
         let exposed = self.read(&pictures.irradiance)?;
         Ok((exposed.iter().map(|e| *e / frame.view.exposure).collect(), stats))
+    }
+
+    /// Submits one frame by the deferred gather, and waits for nothing.
+    ///
+    /// # Errors
+    /// Those of the renderer.
+    pub fn draw(&mut self, frame: &Frame, pictures: &Pictures) -> Result<FrameStats, Error> {
+        self.renderer.prepare(&self.queue, frame)?;
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let irradiance = pictures.irradiance.create_view(&wgpu::TextureViewDescriptor::default());
+        let stats = self.renderer.record(&mut encoder, &pictures.targets(&irradiance))?;
+        self.queue.submit([encoder.finish()]);
+        Ok(stats)
+    }
+
+    /// Waits until all that was submitted is done.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn wait(&self) -> Result<(), Error> {
+        let wait = wgpu::PollType::Wait { submission_index: None, timeout: None };
+        self.device.poll(wait).map(|_| ()).map_err(|error| Error::Device(error.to_string()))
     }
 
     /// What a texture of four halves or floats a pixel holds.

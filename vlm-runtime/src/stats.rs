@@ -51,7 +51,8 @@ pub struct FrameTimes {
 pub struct PassTime {
     /// As in [`FrameStats::passes`].
     pub pass: &'static str,
-    /// Between the timestamps of its beginning and its end, seconds. Software devices tell the wall's time; where passes overlap, so do these.
+    /// From the end of the pass before to its own end, for the first pass from its beginning, seconds: together they are the frame's. Software
+    /// devices tell the wall's time, and some stamp the first beginning too late.
     pub seconds: f64,
 }
 

@@ -148,9 +148,12 @@ impl Timer {
 fn read(buffer: &Buffer, frame: &Frame, period: f64) -> Result<FrameTimes, Error> {
     let mapped = buffer.get_mapped_range(..).map_err(|error| Error::Device(error.to_string()))?;
     let stamps: Vec<u64> = bytemuck::pod_collect_to_vec(&mapped);
+    // From the end of the pass before, so that waiting for it counts for none; a driver may stamp the beginning late, too.
+    let mut before = stamps.first().copied().unwrap_or(0);
     let time = |(&pass, stamps): (&&'static str, &[u64])| {
-        let [start, end] = [0, 1].map(|i| stamps.get(i).copied().unwrap_or(0));
-        PassTime { pass, seconds: end.saturating_sub(start) as f64 * period }
+        let end = stamps.get(1).copied().unwrap_or(before);
+        let ticks = end.saturating_sub(std::mem::replace(&mut before, end));
+        PassTime { pass, seconds: ticks as f64 * period }
     };
     let passes = frame.passes.iter().zip(stamps.chunks_exact(2)).map(time).collect();
     Ok(FrameTimes { frame: frame.number, passes })

@@ -9,6 +9,7 @@ const SUM_BLOCK: u32 = 64u;
 
 fn gather_listed(position: vec3f, normal: vec3f, geometric_normal: vec3f, tag: u32) -> Gathered {
     var gathered = Gathered();
+    let has_own_horizon = any(geometric_normal != normal);
     let count = min(indices[header.summed], header.light_count);
     for (var start = 0u; start < count; start += SUM_BLOCK) {
         var block = vec3f(0.0);
@@ -20,7 +21,7 @@ fn gather_listed(position: vec3f, normal: vec3f, geometric_normal: vec3f, tag: u
             }
             gathered.pairs++;
             let geometry = lights[light];
-            if !is_behind(geometry, position, geometric_normal) {
+            if !(has_own_horizon && is_behind(geometry, position, geometric_normal)) {
                 block += radiosity * form_factor(geometry, position, normal);
             }
         }
