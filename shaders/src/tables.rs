@@ -6,7 +6,7 @@ use vlm_format::Grid;
 
 use crate::cpu::upload::LightSet;
 
-/// Where each of the grid's lists begins in [`GridTables::indices`]; the cells begin at 0. 80 bytes, a uniform buffer.
+/// Where each of the grid's lists begins in [`GridTables::indices`]; the cells begin at 0. 96 bytes, a uniform buffer.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct GridHeader {
@@ -42,7 +42,18 @@ pub struct GridHeader {
     pub uncovered_count: u32,
     /// Of [`LightSet::tags`].
     pub light_tags: u32,
+    /// The lights that are summed at every point: how many, then their numbers; room for all of them.
+    pub summed: u32,
+    /// What `inject` works on, likewise, or [`ALL`]: lights, then pieces of surface without one.
+    pub injected: u32,
+    /// The probes that `refresh` and `refresh_free` work on, likewise.
+    pub refreshed: u32,
+    /// Not used.
+    pub padding: u32,
 }
+
+/// In place of a list's length: no list, but all that there are.
+pub const ALL: u32 = u32::MAX;
 
 /// What a light emits by itself, and the radiosity of the surface that it stands for over its own. 16 bytes.
 #[repr(C)]
@@ -92,6 +103,10 @@ impl GridTables {
             sample_count: lights.samples.len() as u32,
             uncovered_count: grid.uncovered.len() as u32,
             light_tags: append(&lights.tags),
+            summed: append(&room(0, lights.len())),
+            injected: append(&room(ALL, lights.len() + grid.uncovered.len())),
+            refreshed: append(&room(ALL, grid.probes.len())),
+            padding: 0,
         };
         let surface = |light| LightSurface {
             emission: lights.emission.get(light).copied().unwrap_or_default(),
@@ -99,6 +114,13 @@ impl GridTables {
         };
         Self { header, indices, light_surfaces: (0..lights.len()).map(surface).collect() }
     }
+}
+
+/// A list of this length, with room for so many.
+fn room(count: u32, most: usize) -> Vec<u32> {
+    let mut list = vec![0; most + 1];
+    list[0] = count;
+    list
 }
 
 #[cfg(test)]
@@ -134,9 +156,13 @@ mod tests {
             header.row_starts,
             header.sample_starts,
             header.light_tags,
+            header.summed,
+            header.injected,
+            header.refreshed,
         ];
-        assert_eq!(lists.map(at), [10, 20, 30, 40, 50, 60, 70]);
-        assert_eq!((indices[..3].to_vec(), indices.len()), (grid.cells, 18));
+        assert_eq!(lists.map(at), [10, 20, 30, 40, 50, 60, 70, 0, ALL, ALL]);
+        // Each of the last three has room for its length and one light, or no probe.
+        assert_eq!((indices[..3].to_vec(), indices.len()), (grid.cells, 18 + 2 + 2 + 1));
         assert_eq!(light_surfaces[0].gain, 2.0);
     }
 }

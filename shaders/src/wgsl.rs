@@ -24,6 +24,9 @@ pub const GATHER_STATIC: &str = include_str!("../wgsl/shared/gather_static.wgsl"
 /// The rows of probes; after [`GRID`].
 const ROWS: &str = include_str!("../wgsl/shared/rows.wgsl");
 
+/// A point that phase 1 lights.
+const POINT: &str = include_str!("../wgsl/shared/point.wgsl");
+
 /// A point that is lit.
 const RECEIVER: &str = include_str!("../wgsl/shared/receiver.wgsl");
 
@@ -49,7 +52,14 @@ pub fn form_factor_sums() -> String {
 /// The direct light at the points that phase 1 lights; entry point `direct`, 64 invocations per workgroup, one per span of points.
 #[must_use]
 pub fn direct() -> String {
-    format!("{}\n{}", include_str!("../wgsl/shared/punctual.wgsl"), include_str!("../wgsl/direct.wgsl"))
+    [include_str!("../wgsl/shared/punctual.wgsl"), POINT, include_str!("../wgsl/direct.wgsl")].join("\n")
+}
+
+/// The share of a light that the points of phase 1 see by one of its shadow maps; entry point `shadow`, 64 invocations per workgroup, one per
+/// point.
+#[must_use]
+pub fn shadow() -> String {
+    [POINT, include_str!("../wgsl/shared/shadow_map.wgsl"), include_str!("../wgsl/shadow.wgsl")].join("\n")
 }
 
 /// Phase 1: the radiosity of lights and sources; entry point `inject`, 64 invocations per workgroup, one per light and one per piece
@@ -95,19 +105,25 @@ pub struct Gathering {
     pub listed: bool,
     /// Listed lights may have tags.
     pub tags: bool,
+    /// The grid has probes in free space, which light what moves.
+    pub free: bool,
 }
 
 impl Gathering {
     /// All that there are.
-    pub const ALL: [Self; 5] = [
-        Self { grid: true, listed: false, tags: false },
-        Self { grid: false, listed: true, tags: false },
-        Self { grid: false, listed: true, tags: true },
-        Self { grid: true, listed: true, tags: false },
-        Self { grid: true, listed: true, tags: true },
+    pub const ALL: [Self; 8] = [
+        Self { grid: true, listed: false, tags: false, free: false },
+        Self { grid: false, listed: true, tags: false, free: false },
+        Self { grid: false, listed: true, tags: true, free: false },
+        Self { grid: true, listed: true, tags: false, free: false },
+        Self { grid: true, listed: true, tags: true, free: false },
+        Self { grid: true, listed: false, tags: false, free: true },
+        Self { grid: true, listed: true, tags: false, free: true },
+        Self { grid: true, listed: true, tags: true, free: true },
     ];
 
-    /// The function `indirect(position, normal, geometric_normal, tag) -> Gathered` with its bindings in the groups 0 and 1.
+    /// The functions `indirect(position, normal, geometric_normal, tag) -> Gathered` for what stands still, and `indirect_moving` of the same
+    /// parameters for what moves, with their bindings in the groups 0 and 1.
     #[must_use]
     pub fn indirect(self) -> String {
         let tags = if self.tags {
@@ -121,6 +137,9 @@ impl Gathering {
         if self.grid {
             parts.extend(by_grid);
         }
+        if self.free {
+            parts.extend([FREE_LIGHT, GATHER_FREE]);
+        }
         if self.listed {
             parts.extend(by_list);
         }
@@ -128,6 +147,11 @@ impl Gathering {
             (_, false) => include_str!("../wgsl/shared/indirect_grid.wgsl"),
             (false, true) => include_str!("../wgsl/shared/indirect_listed.wgsl"),
             (true, true) => include_str!("../wgsl/shared/indirect_moving.wgsl"),
+        });
+        parts.push(match (self.free, self.listed) {
+            (false, _) => include_str!("../wgsl/shared/moving_as_still.wgsl"),
+            (true, false) => include_str!("../wgsl/shared/moving_free.wgsl"),
+            (true, true) => include_str!("../wgsl/shared/moving_free_listed.wgsl"),
         });
         parts.join("\n")
     }
@@ -154,19 +178,27 @@ impl Gathering {
         } else {
             include_str!("../wgsl/shared/no_count.wgsl")
         };
+        let moving = if self.free {
+            include_str!("../wgsl/shared/moving_texture.wgsl")
+        } else {
+            include_str!("../wgsl/shared/no_moving_texture.wgsl")
+        };
         let view = include_str!("../wgsl/shared/view.wgsl");
         let gather = include_str!("../wgsl/gather_deferred.wgsl");
         let gather = if float { gather.replace("rgba16float", "rgba32float") } else { gather.to_owned() };
-        [&self.indirect(), view, tags, count, &gather].join("\n")
+        [&self.indirect(), view, tags, moving, count, &gather].join("\n")
     }
 
     fn name(self) -> &'static str {
-        match (self.grid, self.listed, self.tags) {
-            (_, false, _) => "gather_deferred, grid",
-            (false, true, false) => "gather_deferred, listed",
-            (false, true, true) => "gather_deferred, listed with tags",
-            (true, true, false) => "gather_deferred, moving",
-            (true, true, true) => "gather_deferred, moving with tags",
+        match (self.grid, self.listed, self.tags, self.free) {
+            (_, false, _, false) => "gather_deferred, grid",
+            (false, true, false, _) => "gather_deferred, listed",
+            (false, true, true, _) => "gather_deferred, listed with tags",
+            (true, true, false, false) => "gather_deferred, moving",
+            (true, true, true, false) => "gather_deferred, moving with tags",
+            (_, false, _, true) => "gather_deferred, grid with free probes",
+            (true, true, false, true) => "gather_deferred, moving with free probes",
+            (true, true, true, true) => "gather_deferred, moving with tags and free probes",
         }
     }
 }
@@ -177,6 +209,7 @@ pub fn all() -> Vec<(&'static str, String)> {
     let mut all = vec![
         ("form_factor_cases", form_factor_cases()),
         ("form_factor_sums", form_factor_sums()),
+        ("shadow", shadow()),
         ("direct", direct()),
         ("inject", inject()),
         ("refresh", refresh()),

@@ -9,6 +9,7 @@ use vlm_shaders::cpu::form_factor::LightGeometry;
 use vlm_shaders::cpu::free_light::FreeLight;
 use vlm_shaders::cpu::gather::Receiver;
 use vlm_shaders::cpu::refresh::{FarLight, FarSource};
+use vlm_shaders::cpu::shadow::ShadowHeader;
 use vlm_shaders::cpu::view::View;
 use vlm_shaders::tables::{GridHeader, LightSurface};
 use vlm_shaders::wgsl::{self, Gathering};
@@ -104,7 +105,11 @@ fn the_grid() {
         light_count,
         sample_count,
         uncovered_count,
-        light_tags
+        light_tags,
+        summed,
+        injected,
+        refreshed,
+        padding
     );
     let leaf = layout_of!(Leaf, 0, probes, free_probes);
     for source in [wgsl::inject(), wgsl::refresh(), wgsl::gather_static()] {
@@ -167,7 +172,25 @@ fn direct_light_and_views() {
     assert_eq!(layout(&direct, "PunctualLight"), light);
     let header = layout_of!(DirectHeader, 0, light_count, point_count, span_count, has_visibility);
     assert_eq!(layout(&direct, "DirectHeader"), header);
-    assert_eq!(layout(&direct, "Point"), layout_of!(Point, 1, position, padding, normal, padding_2));
+    let shadow = wgsl::shadow();
+    for source in [&direct, &shadow] {
+        assert_eq!(layout(source, "Point"), layout_of!(Point, 1, position, padding, normal, padding_2));
+    }
+    let map = layout_of!(
+        ShadowHeader,
+        0,
+        clip_from_world,
+        light,
+        normal_offset,
+        depth_bias,
+        is_reversed,
+        first,
+        point_count,
+        is_first,
+        padding,
+        padding_2
+    );
+    assert_eq!(layout(&shadow, "ShadowHeader"), map);
     assert_eq!(layout(&direct, "Span"), layout_of!(Span, 1, first, count));
     let view = layout_of!(View, 0, world_from_clip, exposure, empty_depth, padding, padding_2);
     for gathering in Gathering::ALL {

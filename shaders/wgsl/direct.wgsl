@@ -1,5 +1,5 @@
-// Direct light at the points that phase 1 lights; an invocation per span of points. After shared/punctual.wgsl; mirror:
-// src/cpu/direct.rs.
+// Direct light at the points that phase 1 lights; an invocation per span of points. After shared/punctual.wgsl and
+// shared/point.wgsl; mirror: src/cpu/direct.rs.
 
 struct DirectHeader {
     light_count: u32,
@@ -7,13 +7,6 @@ struct DirectHeader {
     span_count: u32,
     // 0: every point sees every light, and `visibility` is not read.
     has_visibility: u32,
-}
-
-struct Point {
-    position: vec3f,
-    padding: f32,
-    normal: vec3f,
-    padding_2: f32,
 }
 
 // Points `first` to `first + count`, without the latter.

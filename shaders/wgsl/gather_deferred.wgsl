@@ -1,5 +1,5 @@
 // Phase 2 at every pixel of a G-buffer. After shared/view.wgsl, shared/tag_texture.wgsl (or shared/no_tag_texture.wgsl),
-// shared/count.wgsl (or shared/no_count.wgsl) and one of shared/indirect_*.wgsl.
+// shared/moving_texture.wgsl (or shared/no_moving_texture.wgsl), shared/count.wgsl (or shared/no_count.wgsl) and one of shared/indirect_*.wgsl.
 
 @group(2) @binding(0) var<uniform> view: View;
 @group(2) @binding(1) var depths: texture_2d<f32>;
@@ -28,7 +28,7 @@ fn indirect_at(pixel: vec2u, size: vec2u) -> Gathered {
         return Gathered();
     }
     let unit = inverse_lengths(squared);
-    return indirect(position_at(view, pixel, size, depth), normal * unit.x, geometric_normal * unit.y, tag_at(pixel));
+    return indirect_of(pixel, position_at(view, pixel, size, depth), normal * unit.x, geometric_normal * unit.y);
 }
 
 // Exact to rounding, which `inverseSqrt` is not.

@@ -1,5 +1,5 @@
 // Phase 1: the radiosity of lights and sources, from the direct light on the surface for which they stand; an invocation per light, then
-// one per piece of surface without one. After shared/grid.wgsl; mirror: src/cpu/inject.rs.
+// one per piece of surface without one; or those of `injected` alone. After shared/grid.wgsl; mirror: src/cpu/inject.rs.
 
 struct Sample {
     position: array<f32, 3>,
@@ -37,7 +37,7 @@ struct LightSurface {
 
 @compute @workgroup_size(64)
 fn inject(@builtin(global_invocation_id) id: vec3u) {
-    let light = id.x;
+    let light = listed(header.injected, id.x);
     if light < header.light_count {
         light_sources(light);
         return;

@@ -1,4 +1,5 @@
-// What arrives at the probes, from the radiosity of the sources; one invocation per probe. After shared/grid.wgsl,
+// What arrives at the probes, from the radiosity of the sources; one invocation per probe, or per probe of
+// `refreshed`. After shared/grid.wgsl,
 // shared/blend.wgsl, shared/far.wgsl and shared/rows.wgsl; mirror: src/cpu/refresh.rs.
 //
 // Runs again only where lights changed. Every probe writes its own far light and its own near lights, so invocations share nothing.
@@ -8,12 +9,12 @@ const LEAST_COSINE: f32 = 0.2;
 @group(1) @binding(2) var<storage, read> near_form_factors: array<f32>;
 // One per probe on surface.
 @group(1) @binding(5) var<storage, read_write> far: array<FarLight>;
-// One per element of `near`, lx; w is not used.
+// Room for all near lights of each probe: those that shine, lx, and their number in w, which a float holds exactly up to 2^24; then NO_NEAR.
 @group(1) @binding(6) var<storage, read_write> near_radiosities: array<vec4f>;
 
 @compute @workgroup_size(64)
 fn refresh(@builtin(global_invocation_id) id: vec3u) {
-    let probe = id.x;
+    let probe = listed(header.refreshed, id.x);
     if probe >= header.probe_count {
         return;
     }
@@ -22,8 +23,16 @@ fn refresh(@builtin(global_invocation_id) id: vec3u) {
     }
     let row_scale = probes[probe].row_scale;
     let range = near_range(probe);
+    var place = range.start;
     for (var near = range.start; near < range.end; near++) {
-        near_radiosities[near] = vec4f(near_radiosity(near, row_scale), 0.0);
+        let arriving = near_radiosity(near, row_scale);
+        if any(arriving != vec3f(0.0)) {
+            near_radiosities[place] = vec4f(arriving, f32(indices[header.near + near]));
+            place++;
+        }
+    }
+    if place < range.end {
+        near_radiosities[place] = vec4f(vec3f(0.0), NO_NEAR);
     }
 }
 

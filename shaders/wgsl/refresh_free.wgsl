@@ -1,4 +1,5 @@
-// The light around the probes in free space, from the radiosity of the sources; one invocation per probe. After shared/grid.wgsl,
+// The light around the probes in free space, from the radiosity of the sources; one invocation per such probe, or per
+// probe of `refreshed`. After shared/grid.wgsl,
 // shared/blend.wgsl, shared/free_light.wgsl and shared/rows.wgsl; mirror: `free_light` in src/cpu/free_light.rs.
 //
 // Only for grids that have such probes, and again only where lights changed.
@@ -7,9 +8,16 @@
 
 @compute @workgroup_size(64)
 fn refresh_free(@builtin(global_invocation_id) id: vec3u) {
-    let number = header.surface_probes + id.x;
-    if number < header.probe_count && id.x < arrayLength(&free) {
-        free[id.x] = free_light(number);
+    var number = header.surface_probes + id.x;
+    if indices[header.refreshed] != ALL {
+        number = listed(header.refreshed, id.x);
+    }
+    if number < header.surface_probes || number >= header.probe_count {
+        return;
+    }
+    let place = number - header.surface_probes;
+    if place < arrayLength(&free) {
+        free[place] = free_light(number);
     }
 }
 

@@ -6,6 +6,7 @@ use vlm_bake::scene::{Camera, Projection};
 use vlm_bake::shade::{SurfacePoint, TraceScene};
 use vlm_runtime::{
     Error, Frame, FrameStats, Point, PunctualLight, Settings, Targets, View, VlmAsset, VlmRenderer,
+    request_device_with,
 };
 use wgpu::{Device, Queue, Texture, TextureFormat, TextureUsages, TextureView};
 
@@ -32,17 +33,19 @@ pub struct Pictures {
     normal: TextureView,
     geometric_normal: TextureView,
     tag: TextureView,
+    /// Not 0 where the surface moves; none by default.
+    pub moving: Option<TextureView>,
     /// What the deferred gather writes.
     pub irradiance: Texture,
 }
 
 impl Host {
-    /// The first Vulkan adapter.
+    /// The first Vulkan adapter, with timestamps where it has them.
     ///
     /// # Errors
     /// Where there is none, or the asset does not fit it.
     pub fn new(asset: &VlmAsset, settings: Settings) -> Result<Self, Error> {
-        let (device, queue) = vlm_runtime::request_device(wgpu::Backends::VULKAN)?;
+        let (device, queue) = request_device_with(wgpu::Backends::VULKAN, wgpu::Features::TIMESTAMP_QUERY)?;
         let mut renderer = VlmRenderer::new(&device, settings)?;
         renderer.load(asset)?;
         Ok(Self { device, queue, renderer, format: settings.format.texture_format() })
@@ -70,6 +73,7 @@ impl Host {
                 bytemuck::cast_slice(&geometric_normal),
             ),
             tag: self.texture(size, TextureFormat::R32Uint, bytemuck::cast_slice(&tags)),
+            moving: None,
             irradiance: self.target(size, self.format),
         }
     }
@@ -99,15 +103,32 @@ impl Host {
     /// # Errors
     /// Those of the renderer.
     pub fn frame(&mut self, frame: &Frame, pictures: &Pictures) -> Result<(Vec<Vec3>, FrameStats), Error> {
-        self.renderer.prepare(&self.queue, frame)?;
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let irradiance = pictures.irradiance.create_view(&wgpu::TextureViewDescriptor::default());
-        let targets = pictures.targets(&irradiance);
-        let mut stats = self.renderer.record(&mut encoder, &targets)?;
-        self.queue.submit([encoder.finish()]);
+        let mut stats = self.draw(frame, pictures)?;
         stats.pairs_evaluated = self.renderer.pairs_evaluated(&self.queue).ok();
         let exposed = self.read(&pictures.irradiance)?;
         Ok((exposed.iter().map(|e| *e / frame.view.exposure).collect(), stats))
+    }
+
+    /// Submits one frame by the deferred gather, and waits for nothing.
+    ///
+    /// # Errors
+    /// Those of the renderer.
+    pub fn draw(&mut self, frame: &Frame, pictures: &Pictures) -> Result<FrameStats, Error> {
+        self.renderer.prepare(&self.queue, frame)?;
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let irradiance = pictures.irradiance.create_view(&wgpu::TextureViewDescriptor::default());
+        let stats = self.renderer.record(&mut encoder, &pictures.targets(&irradiance))?;
+        self.queue.submit([encoder.finish()]);
+        Ok(stats)
+    }
+
+    /// Waits until all that was submitted is done.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn wait(&self) -> Result<(), Error> {
+        let wait = wgpu::PollType::Wait { submission_index: None, timeout: None };
+        self.device.poll(wait).map(|_| ()).map_err(|error| Error::Device(error.to_string()))
     }
 
     /// What a texture of four halves or floats a pixel holds.
@@ -155,6 +176,7 @@ impl Pictures {
             normal: &self.normal,
             geometric_normal: Some(&self.geometric_normal),
             tag: Some(&self.tag),
+            moving: self.moving.as_ref(),
             irradiance,
         }
     }

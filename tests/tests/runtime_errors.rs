@@ -88,7 +88,7 @@ fn order() {
     assert!(matches!(renderer.record_light(&mut encoder), Err(Error::NotPrepared)));
     assert!(matches!(renderer.pairs_evaluated(&queue), Err(Error::CountingOff)));
     renderer.prepare(&queue, &Frame::default()).unwrap();
-    assert_eq!(renderer.record_light(&mut encoder).unwrap().passes[..1], ["direct"]);
+    assert_eq!(renderer.record_light(&mut encoder).unwrap().passes[..1], ["inject"]);
 }
 
 #[test]
@@ -157,8 +157,14 @@ fn textures() {
     let tag = host.texture([4, 4], TextureFormat::R32Uint, &[0; 64]);
     let view = |format| host.target([4, 4], format).create_view(&wgpu::TextureViewDescriptor::default());
     let (half, float) = (view(TextureFormat::Rgba16Float), view(TextureFormat::Rgba32Float));
-    let good =
-        Targets { depth: &depth, normal: &normal, geometric_normal: None, tag: None, irradiance: &half };
+    let good = Targets {
+        depth: &depth,
+        normal: &normal,
+        geometric_normal: None,
+        tag: None,
+        moving: None,
+        irradiance: &half,
+    };
     let mut record = |targets: Targets| {
         let mut encoder = host.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         host.renderer.record(&mut encoder, &targets)
@@ -168,10 +174,11 @@ fn textures() {
         ("depth", Targets { depth: &small, ..good }),
         ("normal", Targets { normal: &tag, ..good }),
         ("tag", Targets { tag: Some(&normal), ..good }),
+        ("moving", Targets { moving: Some(&depth), ..good }),
     ] {
         let error = record(targets).unwrap_err();
         assert!(matches!(&error, Error::Target { what, .. } if *what == name), "{name}: {error:?}");
     }
     let stats = record(good).unwrap();
-    assert_eq!(stats.passes[..1], ["direct"], "a refused frame did not lose its changes");
+    assert_eq!(stats.passes[..1], ["inject"], "a refused frame did not lose its changes");
 }

@@ -76,8 +76,8 @@ fn a_camera_only_frame_runs_the_gather_alone() {
 #[cfg_attr(not(has_vulkan), ignore = "no Vulkan driver")]
 fn lights_out_of_reach_are_not_injected_again() {
     let (mut host, pictures, view) = host(&CORNELL.1);
+    let point = host.renderer.points().unwrap()[0];
     let near = |intensity: f32| {
-        let point = host.renderer.points().unwrap()[0];
         let position = point.position + 0.05 * point.normal;
         PunctualLight { range: 0.1, ..PunctualLight::point(position, Vec3::splat(intensity)) }
     };
@@ -88,9 +88,98 @@ fn lights_out_of_reach_are_not_injected_again() {
     assert!((1..first.lights_injected / 2).contains(&second.lights_injected), "{second:?}");
     assert_eq!(second.lights_injected + second.lights_skipped.unchanged, first.lights_injected);
     assert!(before != after, "those that it reaches are");
-    let (mut fresh, pictures, _) = self::host(&CORNELL.1);
-    let (anew, _) = fresh.frame(&Frame { lights: &bright, ..frame }, &pictures).unwrap();
+    assert_eq!(second.passes, ["direct", "inject", "refresh", "gather"]);
+    assert!((1..second.probes).contains(&second.probes_refreshed), "{second:?}");
+    assert_eq!(first.probes_refreshed, first.probes);
+    let (mut fresh, fresh_pictures, _) = self::host(&CORNELL.1);
+    let (anew, _) = fresh.frame(&Frame { lights: &bright, ..frame }, &fresh_pictures).unwrap();
     assert!(anew == after, "what was skipped had not changed");
+    // Back to all: the lamp reaches everything.
+    let all = [PunctualLight { intensity: Vec3::ONE, ..lamp() }, near(5.0)];
+    let (_, third) = host.frame(&Frame { lights: &all, ..frame }, &pictures).unwrap();
+    assert_eq!((third.lights_injected, third.probes_refreshed), (first.lights_injected, first.probes));
+}
+
+/// Two frames in a row may change different lights before anything is recorded.
+#[test]
+#[cfg_attr(not(has_vulkan), ignore = "no Vulkan driver")]
+fn a_frame_that_is_not_recorded_loses_no_change() {
+    let (mut host, pictures, view) = host(&CORNELL.1);
+    let points = host.renderer.points().unwrap().to_vec();
+    let near = |point: usize, intensity: f32| {
+        let position = points[point].position + 0.05 * points[point].normal;
+        PunctualLight { range: 0.1, ..PunctualLight::point(position, Vec3::splat(intensity)) }
+    };
+    let last = points.len() - 1;
+    let frame = Frame { view, ..Frame::default() };
+    let [dim, first, both] =
+        [[near(0, 1.0), near(last, 1.0)], [near(0, 2.0), near(last, 1.0)], [near(0, 2.0), near(last, 2.0)]];
+    host.frame(&Frame { lights: &dim, ..frame }, &pictures).unwrap();
+    host.renderer.prepare(&host.queue, &Frame { lights: &first, ..frame }).unwrap();
+    let (found, stats) = host.frame(&Frame { lights: &both, ..frame }, &pictures).unwrap();
+    assert!(stats.probes_refreshed > 0 && stats.probes_refreshed < stats.probes, "{stats:?}");
+    let (mut fresh, pictures, _) = self::host(&CORNELL.1);
+    let (anew, _) = fresh.frame(&Frame { lights: &both, ..frame }, &pictures).unwrap();
+    assert!(anew == found);
+}
+
+#[test]
+#[cfg_attr(not(has_vulkan), ignore = "no Vulkan driver")]
+fn unlit_lights_are_never_evaluated() {
+    let (mut host, pictures, view) = host(&CORNELL.1);
+    let (_, dark) = host.frame(&Frame { view, ..Frame::default() }, &pictures).unwrap();
+    assert_eq!(
+        (dark.lights_injected, dark.lights_skipped.unlit),
+        (0, dark.lights - dark.lights_skipped.black)
+    );
+    assert_eq!(dark.passes, ["inject", "refresh", "gather"], "no direct light to be found");
+    let far = [PunctualLight { range: 1.0, ..PunctualLight::point(Vec3::splat(1e3), Vec3::ONE) }];
+    let (_, out_of_range) = host.frame(&Frame { lights: &far, view, ..Frame::default() }, &pictures).unwrap();
+    assert_eq!(out_of_range.passes, ["gather"]);
+    assert_eq!(out_of_range.lights_skipped, dark.lights_skipped);
+    let (_, lit) = host.frame(&Frame { lights: &[lamp()], view, ..Frame::default() }, &pictures).unwrap();
+    assert_eq!((lit.lights_skipped.unlit, lit.lights_injected), (0, dark.lights_skipped.unlit));
+}
+
+#[test]
+#[cfg_attr(not(has_vulkan), ignore = "no Vulkan driver")]
+fn lights_of_the_own_tag_are_never_evaluated() {
+    let pairs = |of_lights: u32, of_surface: u32| {
+        let asset = changed(|data| {
+            data.grid = None;
+            data.tags = vec![of_lights; data.triangles.len()];
+        });
+        let scene = &CORNELL.0;
+        let (trace, camera) = (TraceScene::new(scene), &scene.cameras[0]);
+        let gbuffer = GBuffer::trace(&trace, camera, SIZE, SIZE);
+        let mut host = Host::new(&asset, Settings { count_pairs: true, ..Settings::default() }).unwrap();
+        let pictures = host.upload(&gbuffer, camera, |_| of_surface);
+        let frame = Frame { lights: &[lamp()], view: view(camera, &gbuffer, 1.0), ..Frame::default() };
+        host.frame(&frame, &pictures).unwrap().1.pairs_evaluated.unwrap()
+    };
+    assert_eq!(pairs(3, 3), 0);
+    assert!(pairs(3, 4) > 1000 && pairs(3, 4) == pairs(0, 0), "the negative control");
+}
+
+/// What an asset lacks is neither bound nor compiled.
+#[test]
+#[cfg_attr(not(has_vulkan), ignore = "no Vulkan driver")]
+fn shaders_hold_nothing_that_the_asset_lacks() {
+    let module = |asset: &VlmAsset, settings: Settings| {
+        Host::new(asset, settings).unwrap().renderer.forward_module(2).unwrap()
+    };
+    let (grid, none) = (Settings::default(), changed(|data| data.grid = None));
+    let by_grid = module(&CORNELL.1, grid);
+    let listed = module(&none, grid);
+    let moving = module(&CORNELL.1, Settings { moving_nodes: true, ..grid });
+    for (module, grid, list) in [(by_grid, true, false), (listed, false, true), (moving, true, true)] {
+        assert_eq!(module.contains("fn gather_static("), grid);
+        assert_eq!(module.contains("near_radiosities: array"), grid);
+        assert_eq!(module.contains("fn gather_listed("), list);
+        assert_eq!(module.contains("light_radiosity: array"), list);
+        assert!(!module.contains("fn gather_free("), "the box has no probes in free space");
+        assert!(module.contains("fn indirect_moving("), "but shaders may ask all the same");
+    }
 }
 
 #[test]
@@ -147,7 +236,7 @@ fn black_lights_are_never_evaluated() {
     assert!(all.pairs_evaluated.unwrap() > 1000, "{all:?}");
     // What glows by itself stays; the lamp of this box is a punctual light.
     assert_eq!(none.pairs_evaluated, Some(0), "{none:?}");
-    assert_eq!(none.lights_skipped, Skipped { unchanged: 0, black: none.lights });
+    assert_eq!(none.lights_skipped, Skipped { black: none.lights, ..Skipped::default() });
     assert_eq!(none.passes, ["inject", "gather"], "{none:?}");
 }
 

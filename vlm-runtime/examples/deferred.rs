@@ -42,8 +42,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let pipeline = game.pipeline(&[VERTEX, NORMALS].concat(), &[Some(&layout)]);
     let mut encoder = game.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     game.draw(&mut encoder, &pipeline, [&normal, &depth], &[&camera]);
-    let targets =
-        Targets { depth: &depth, normal: &normal, geometric_normal: None, tag: None, irradiance: &result };
+    let targets = Targets {
+        depth: &depth,
+        normal: &normal,
+        geometric_normal: None,
+        tag: None,
+        moving: None,
+        irradiance: &result,
+    };
     let stats = renderer.record(&mut encoder, &targets)?;
     game.queue.submit([encoder.finish()]);
 

@@ -18,8 +18,20 @@ struct LitSpan {
     light: Option<u32>,
     least: Vec3,
     most: Vec3,
+    /// Some real light of the frame reaches it.
+    is_lit: bool,
     /// Needs its light anew.
     dirty: bool,
+}
+
+/// Where the visibility comes from.
+enum Seen {
+    /// Every point sees every light.
+    All,
+    /// From the host.
+    Given(Vec<f32>),
+    /// From shadow maps of so many lights, on the device.
+    Maps(usize),
 }
 
 /// What the last frame was lit by, and what changed since.
@@ -28,15 +40,17 @@ pub(crate) struct Changes {
     spans: Vec<LitSpan>,
     /// Of all the asset's.
     light_count: u32,
+    /// Of all the asset's.
+    sample_count: u32,
     /// Lights that reflect nothing.
     black: u32,
     lights: Vec<PunctualLight>,
-    visibility: Option<Vec<f32>>,
+    seen: Seen,
     point_count: usize,
 }
 
 impl Changes {
-    /// Everything is to be lit.
+    /// Nothing is lit, which the direct light on the device, all 0, says already.
     pub(crate) fn new(set: &LightSet, reflectance_of_pieces: &[Vec3], points: &[Point]) -> Self {
         let reflects = |sample: u32| {
             set.samples.get(sample as usize).is_some_and(|sample| sample.reflectance != Vec3::ZERO)
@@ -64,9 +78,10 @@ impl Changes {
         Self {
             spans,
             light_count: set.len() as u32,
+            sample_count: set.samples.len() as u32,
             black,
             lights: Vec::new(),
-            visibility: None,
+            seen: Seen::All,
             point_count: points.len(),
         }
     }
@@ -81,13 +96,31 @@ impl Changes {
         self.spans.iter().filter(|lit| lit.dirty).map(|lit| lit.span).collect()
     }
 
-    /// How many lights that is, and how many are skipped.
+    /// The lights and, counted on from these, pieces of surface that the spans belong to; ascending.
+    pub(crate) fn dirty_elements(&self) -> Vec<u32> {
+        let samples = self.sample_count;
+        let element = |lit: &LitSpan| {
+            lit.light.unwrap_or_else(|| self.light_count + lit.span.first.saturating_sub(samples))
+        };
+        let mut elements: Vec<u32> = self.spans.iter().filter(|lit| lit.dirty).map(element).collect();
+        elements.dedup();
+        elements
+    }
+
+    /// How many lights have dirty spans, and how many are skipped.
     pub(crate) fn counts(&self) -> (u32, Skipped) {
-        let mut injected: Vec<u32> =
-            self.spans.iter().filter(|lit| lit.dirty).filter_map(|lit| lit.light).collect();
-        injected.dedup();
-        let injected = injected.len() as u32;
-        (injected, Skipped { unchanged: self.light_count - self.black - injected, black: self.black })
+        let (mut injected, mut skipped) = (0, Skipped { black: self.black, ..Skipped::default() });
+        for spans in self.spans.chunk_by(|a, b| a.light == b.light && a.light.is_some()) {
+            if spans.iter().any(|lit| lit.light.is_none()) {
+                continue;
+            }
+            match (spans.iter().any(|lit| lit.dirty), spans.iter().any(|lit| lit.is_lit)) {
+                (true, _) => injected += 1,
+                (false, true) => skipped.unchanged += 1,
+                (false, false) => skipped.unlit += 1,
+            }
+        }
+        (injected, skipped)
     }
 
     /// All that was dirty has its light.
@@ -102,19 +135,30 @@ impl Changes {
             .filter(|&i| before.get(i) != lights.get(i))
             .flat_map(|i| before.get(i).into_iter().chain(lights.get(i)).copied())
             .collect();
+        if changed.is_empty() {
+            return false;
+        }
         for lit in &mut self.spans {
             lit.dirty |= changed.iter().any(|light| lit.is_reached(light));
+            lit.is_lit = lights.iter().any(|light| lit.is_reached(light));
         }
-        !changed.is_empty()
+        true
     }
 
     /// Takes a frame's visibility; the numbers of the lights for which any of it changed.
     pub(crate) fn see(&mut self, visibility: &[f32]) -> Vec<u32> {
-        if self.visibility.as_deref() == Some(visibility) {
+        if matches!(&self.seen, Seen::Given(before) if before == visibility) {
             return Vec::new();
         }
-        let before = self.visibility.replace(visibility.to_vec());
         let points = self.point_count.max(1);
+        let before = match std::mem::replace(&mut self.seen, Seen::Given(visibility.to_vec())) {
+            Seen::All => None,
+            Seen::Given(before) => Some(before),
+            Seen::Maps(_) => {
+                self.spans.iter_mut().for_each(|lit| lit.dirty |= lit.is_lit);
+                return (0..visibility.len().div_ceil(points) as u32).collect();
+            }
+        };
         // Before the first visibility, every point saw every light.
         let seen = vec![1.0; points];
         let mut changed = Vec::new();
@@ -125,29 +169,49 @@ impl Changes {
             }
             let then = known.unwrap_or(&seen);
             changed.push(light as u32);
+            let real_light = self.lights.get(light);
             for lit in &mut self.spans {
                 let span = lit.span.first as usize..(lit.span.first + lit.span.count) as usize;
-                lit.dirty |= then.get(span.clone()) != now.get(span);
+                let is_reached = real_light.is_some_and(|light| lit.is_reached(light));
+                lit.dirty |= is_reached && then.get(span.clone()) != now.get(span);
             }
         }
         changed
     }
 
+    /// The visibility of this frame's lights comes from shadow maps, and that of these lights changes.
+    pub(crate) fn map(&mut self, changed: &[u32]) {
+        if matches!(self.seen, Seen::Given(_)) {
+            self.spans.iter_mut().for_each(|lit| lit.dirty |= lit.is_lit);
+        }
+        self.seen = Seen::Maps(self.lights.len());
+        let changed: Vec<&PunctualLight> =
+            changed.iter().filter_map(|&light| self.lights.get(light as usize)).collect();
+        for lit in &mut self.spans {
+            lit.dirty |= changed.iter().any(|light| lit.is_reached(light));
+        }
+    }
+
     /// Whether visibility was ever given.
     pub(crate) fn has_visibility(&self) -> bool {
-        self.visibility.is_some()
+        !matches!(self.seen, Seen::All)
     }
 
     /// Numbers of visibility as it was last given.
     pub(crate) fn visibility_len(&self) -> usize {
-        self.visibility.as_ref().map_or(0, Vec::len)
+        match &self.seen {
+            Seen::All => 0,
+            Seen::Given(visibility) => visibility.len(),
+            Seen::Maps(lights) => lights * self.point_count,
+        }
     }
 
     /// The points of some lights moved.
     pub(crate) fn moved(&mut self, lights: std::ops::Range<u32>, points: &[Point]) {
         for lit in &mut self.spans {
             if lit.light.is_some_and(|light| lights.contains(&light)) {
-                *lit = LitSpan::new(lit.span, lit.light, points);
+                *lit = LitSpan { dirty: true, ..LitSpan::new(lit.span, lit.light, points) };
+                lit.is_lit = self.lights.iter().any(|light| lit.is_reached(light));
             }
         }
     }
@@ -161,7 +225,7 @@ impl LitSpan {
             least = least.min(point.position);
             most = most.max(point.position);
         }
-        Self { span, light, least, most, dirty: true }
+        Self { span, light, least, most, is_lit: false, dirty: false }
     }
 
     /// False only where a light's range ends before all points.
@@ -202,10 +266,12 @@ mod tests {
 
     #[test]
     fn long_lights_divide_and_black_ones_are_left_out() {
-        let changes = changes();
+        let mut changes = changes();
+        assert!(changes.dirty().is_empty(), "without lights all is black");
+        changes.light(&[PunctualLight::directional(Vec3::Z, Vec3::ONE)]);
         let spans: Vec<(u32, u32)> = changes.dirty().iter().map(|span| (span.first, span.count)).collect();
         assert_eq!(spans, [(0, 1), (2, 64), (66, 6), (72, 1)]);
-        assert_eq!(changes.counts(), (2, Skipped { unchanged: 0, black: 1 }));
+        assert_eq!(changes.counts(), (2, Skipped { black: 1, ..Skipped::default() }));
     }
 
     #[test]
@@ -217,11 +283,13 @@ mod tests {
         assert!(!changes.light(&[lamp]) && changes.dirty().is_empty(), "the same light");
         assert!(changes.light(&[PunctualLight { intensity: Vec3::X, ..lamp }]));
         assert_eq!(changes.dirty().len(), 1);
-        assert_eq!(changes.counts(), (1, Skipped { unchanged: 1, black: 1 }));
+        assert_eq!(changes.counts(), (1, Skipped { unlit: 1, black: 1, ..Skipped::default() }));
+        assert_eq!(changes.dirty_elements(), [0]);
         changes.clean();
         // Where it was and where it is.
         assert!(changes.light(&[PunctualLight { position: Vec3::X * 29.0, ..lamp }]));
         assert_eq!(changes.dirty(), [Span { first: 0, count: 1 }, Span { first: 72, count: 1 }]);
+        assert_eq!(changes.dirty_elements(), [0, 3], "a light and the first piece");
         changes.clean();
         assert!(changes.light(&[]), "it went out");
         assert_eq!(changes.dirty().len(), 1);

@@ -7,13 +7,25 @@ use crate::error::{Error, within};
 /// # Errors
 /// [`Error::NoAdapter`] where there is none, [`Error::Device`] where it gives no device.
 pub fn request_device(backends: wgpu::Backends) -> Result<(wgpu::Device, wgpu::Queue), Error> {
+    request_device_with(backends, wgpu::Features::empty())
+}
+
+/// [`request_device`] with those of these optional features that the adapter has: `TIMESTAMP_QUERY` for [`crate::Settings::time_passes`].
+///
+/// # Errors
+/// As [`request_device`].
+pub fn request_device_with(
+    backends: wgpu::Backends,
+    optional: wgpu::Features,
+) -> Result<(wgpu::Device, wgpu::Queue), Error> {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = backends;
     let instance = wgpu::Instance::new(descriptor);
     let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))
         .map_err(|error| Error::NoAdapter(error.to_string()))?;
-    pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default()))
-        .map_err(|error| Error::Device(error.to_string()))
+    let required_features = adapter.features() & optional;
+    let descriptor = wgpu::DeviceDescriptor { required_features, ..wgpu::DeviceDescriptor::default() };
+    pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| Error::Device(error.to_string()))
 }
 
 /// What any asset's passes need of a device, whatever its size.
@@ -33,7 +45,7 @@ pub fn check_limits(limits: &wgpu::Limits) -> Result<(), Error> {
         (
             "the gather",
             "max_sampled_textures_per_shader_stage",
-            4,
+            5,
             limits.max_sampled_textures_per_shader_stage,
         ),
         (

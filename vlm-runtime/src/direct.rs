@@ -3,10 +3,10 @@
 use vlm_shaders::cpu::direct::{DirectHeader, PackedLight, Span};
 use vlm_shaders::cpu::punctual::PunctualLight;
 use vlm_shaders::wgsl;
-use wgpu::{BindGroup, BindGroupLayout, Buffer, CommandEncoder, ComputePipeline, Device, Queue};
+use wgpu::{BindGroup, BindGroupLayout, Buffer, ComputePipeline, Device, Queue};
 
 use crate::error::Error;
-use crate::pass::{self, Buffers, dispatch, group, layout, storage, uniform, workgroups};
+use crate::pass::{self, Buffers, Passes, group, layout, storage, uniform, workgroups};
 use crate::upload::{MOST_REAL_LIGHTS, Uploaded};
 
 /// The pass for any asset.
@@ -64,6 +64,27 @@ impl Direct {
         write(queue, &self.lights, 0, &packed)
     }
 
+    /// Makes the visibility as large as this, in bytes; true if it holds zeros now.
+    pub(crate) fn make_room(
+        &mut self,
+        (buffers, pipeline): (&Buffers, &DirectPipeline),
+        size: u64,
+    ) -> Result<bool, Error> {
+        if self.visibility.size() >= size {
+            return Ok(false);
+        }
+        self.visibility = buffers.zeros("visibility", size)?;
+        let bound =
+            [&self.header, &self.lights, &self.points, &self.visibility, &self.spans, &self.irradiance];
+        self.group = bind(buffers.device, pipeline, bound);
+        Ok(true)
+    }
+
+    /// The points, and the share of each light that each of them sees.
+    pub(crate) fn points_and_visibility(&self) -> (&Buffer, &Buffer) {
+        (&self.points, &self.visibility)
+    }
+
     /// Writes the visibility of the lights of these numbers; bytes written.
     pub(crate) fn write_visibility(
         &mut self,
@@ -72,12 +93,7 @@ impl Direct {
         visibility: &[f32],
         changed: &[u32],
     ) -> Result<u64, Error> {
-        let size = size_of_val(visibility) as u64;
-        if self.visibility.size() < size {
-            self.visibility = buffers.zeros("visibility", size)?;
-            let bound =
-                [&self.header, &self.lights, &self.points, &self.visibility, &self.spans, &self.irradiance];
-            self.group = bind(buffers.device, pipeline, bound);
+        if self.make_room((buffers, pipeline), size_of_val(visibility) as u64)? {
             return Ok(write(queue, &self.visibility, 0, visibility));
         }
         let points = self.point_count as usize;
@@ -109,13 +125,12 @@ impl Direct {
         Ok(write(queue, &self.header, 0, &[header]) + write(queue, &self.spans, 0, spans))
     }
 
-    /// Lights the spans, if there are any; true if it ran.
-    pub(crate) fn record(&mut self, encoder: &mut CommandEncoder, pipeline: &DirectPipeline) -> bool {
+    /// Lights the spans, if there are any.
+    pub(crate) fn record(&mut self, passes: &mut Passes<'_>, pipeline: &DirectPipeline) {
         let workgroups = std::mem::take(&mut self.workgroups);
         if workgroups > 0 {
-            dispatch(encoder, "direct", &pipeline.pipeline, &[&self.group], [workgroups, 1]);
+            passes.add("direct", &pipeline.pipeline, &[&self.group], [workgroups, 1]);
         }
-        workgroups > 0
     }
 }
 

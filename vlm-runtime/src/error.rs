@@ -66,6 +66,16 @@ pub enum Error {
         /// Index of the glTF node.
         node: u32,
     },
+    /// A shadow map belongs to no light of the frame.
+    #[error("shadow map {map} is of light {light}, but the frame has {lights} lights")]
+    UnknownLight {
+        /// The map's number in [`crate::Visibility::Maps`].
+        map: u32,
+        /// [`crate::ShadowMap::light`].
+        light: u32,
+        /// Real lights of the frame.
+        lights: u32,
+    },
     /// A number of the frame is infinite or not a number.
     #[error("{what} is not finite")]
     NotFinite {

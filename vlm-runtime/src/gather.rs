@@ -3,14 +3,14 @@
 use vlm_shaders::cpu::view::View;
 use vlm_shaders::wgsl::Gathering;
 use wgpu::{
-    BindGroup, BindGroupLayout, BindingType, Buffer, CommandEncoder, ComputePipeline, Device, Queue,
-    TextureFormat, TextureView,
+    BindGroup, BindGroupLayout, BindingType, Buffer, ComputePipeline, Device, Queue, TextureFormat,
+    TextureView,
 };
 
 use crate::direct::write;
 use crate::error::{Error, within};
 use crate::frame::{IrradianceFormat, Settings, Targets};
-use crate::pass::{self, Buffers, dispatch, group, layout, storage, uniform};
+use crate::pass::{self, Buffers, Passes, group, layout, storage, uniform};
 use crate::upload::Uploaded;
 
 /// Pixels of a workgroup along x and y, as in the shader.
@@ -26,7 +26,8 @@ pub(crate) struct Gather {
     pipeline: ComputePipeline,
     view: Buffer,
     written_view: Option<View>,
-    untagged: TextureView,
+    /// Reads as 0 everywhere: no tag, nothing that moves.
+    zero: TextureView,
     /// Where pairs are counted.
     pub pair_count: Option<Buffer>,
 }
@@ -54,7 +55,7 @@ impl Gather {
             format,
             view: buffers.uniform("view", bytemuck::bytes_of(&View::default()))?,
             written_view: None,
-            untagged: untagged(device),
+            zero: zero(device),
             pair_count: counted.then(|| buffers.zeros("pair_count", 8)).transpose()?,
         })
     }
@@ -66,18 +67,18 @@ impl Gather {
 
     pub(crate) fn record(
         &self,
-        encoder: &mut CommandEncoder,
+        passes: &mut Passes<'_>,
         device: &Device,
         common: &BindGroup,
         targets: &Targets<'_>,
     ) {
         let [width, height] = size(targets.irradiance);
         if let Some(pairs) = &self.pair_count {
-            encoder.clear_buffer(pairs, 0, None);
+            passes.clear(pairs);
         }
         let group = self.bind(device, targets);
         let tiles = [width.div_ceil(TILE), height.div_ceil(TILE)];
-        dispatch(encoder, "gather", &self.pipeline, &[common, &self.scene_group, &group], tiles);
+        passes.add("gather", &self.pipeline, &[common, &self.scene_group, &group], tiles);
     }
 
     /// Every texture has the size of the irradiance and a format that can be read.
@@ -98,7 +99,10 @@ impl Gather {
             texture(4, targets.irradiance),
         ];
         if self.gathering.tags {
-            entries.push(texture(5, targets.tag.unwrap_or(&self.untagged)));
+            entries.push(texture(5, targets.tag.unwrap_or(&self.zero)));
+        }
+        if self.gathering.free {
+            entries.push(texture(7, targets.moving.unwrap_or(&self.zero)));
         }
         if let Some(pairs) = &self.pair_count {
             entries.push(wgpu::BindGroupEntry { binding: 6, resource: pairs.as_entire_binding() });
@@ -116,9 +120,10 @@ fn scene(device: &Device, uploaded: &Uploaded, gathering: Gathering) -> (BindGro
     let mut bound = vec![(1, &uploaded.geometry)];
     if let Some(grid) = uploaded.grid.as_ref().filter(|_| gathering.grid) {
         bound.extend([(0, &grid.probes), (2, &grid.far), (3, &grid.near_radiosities)]);
+        bound.extend(grid.free.as_ref().filter(|_| gathering.free).map(|free| (6, free)));
     }
     if gathering.listed {
-        bound.extend([(4, &uploaded.light_radiosity), (5, &uploaded.listed)]);
+        bound.push((4, &uploaded.light_radiosity));
     }
     let bindings: Vec<(u32, BindingType)> =
         bound.iter().map(|(binding, _)| (*binding, storage(true))).collect();
@@ -128,12 +133,7 @@ fn scene(device: &Device, uploaded: &Uploaded, gathering: Gathering) -> (BindGro
 }
 
 fn target_bindings(gathering: Gathering, counted: bool, format: TextureFormat) -> Vec<(u32, BindingType)> {
-    let texture = |sample_type| BindingType::Texture {
-        sample_type,
-        view_dimension: wgpu::TextureViewDimension::D2,
-        multisampled: false,
-    };
-    let float = texture(wgpu::TextureSampleType::Float { filterable: false });
+    let float = float_texture();
     let written = BindingType::StorageTexture {
         access: wgpu::StorageTextureAccess::WriteOnly,
         format,
@@ -146,13 +146,25 @@ fn target_bindings(gathering: Gathering, counted: bool, format: TextureFormat) -
     if counted {
         bindings.push((6, storage(false)));
     }
+    if gathering.free {
+        bindings.push((7, texture(wgpu::TextureSampleType::Uint)));
+    }
     bindings
 }
 
-/// Reads as tag 0 everywhere.
-fn untagged(device: &Device) -> TextureView {
+/// A texture of numbers that is not filtered: depth formats too.
+pub(crate) fn float_texture() -> BindingType {
+    texture(wgpu::TextureSampleType::Float { filterable: false })
+}
+
+fn texture(sample_type: wgpu::TextureSampleType) -> BindingType {
+    BindingType::Texture { sample_type, view_dimension: wgpu::TextureViewDimension::D2, multisampled: false }
+}
+
+/// Reads as 0 everywhere.
+fn zero(device: &Device) -> TextureView {
     let texture = device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("untagged"),
+        label: Some("zero"),
         size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
         mip_level_count: 1,
         sample_count: 1,
@@ -176,6 +188,7 @@ fn check(targets: &Targets<'_>, written: TextureFormat, device: &Device) -> Resu
         ("normal", Some(targets.normal)),
         ("geometric normal", targets.geometric_normal),
         ("tag", targets.tag),
+        ("moving", targets.moving),
     ];
     for (what, view) in inputs.into_iter().filter_map(|(what, view)| Some((what, view?))) {
         let [width, height] = size(view);
@@ -194,14 +207,15 @@ fn size(view: &TextureView) -> [u32; 2] {
     [view.texture().width(), view.texture().height()]
 }
 
-fn check_format(what: &'static str, view: &TextureView) -> Result<(), Error> {
+pub(crate) fn check_format(what: &'static str, view: &TextureView) -> Result<(), Error> {
     let format = view.texture().format();
     let sampled = format.sample_type(Some(wgpu::TextureAspect::All), None);
     let sampled = sampled.or_else(|| format.sample_type(Some(wgpu::TextureAspect::DepthOnly), None));
+    let is_integer = matches!(what, "tag" | "moving");
     let (fits, expected) = match sampled {
-        Some(wgpu::TextureSampleType::Uint) => (what == "tag", "a float or depth format"),
+        Some(wgpu::TextureSampleType::Uint) => (is_integer, "a float or depth format"),
         Some(wgpu::TextureSampleType::Sint) => (false, "an unsigned integer, float or depth format"),
-        _ => (what != "tag", "an unsigned integer format"),
+        _ => (!is_integer, "an unsigned integer format"),
     };
     if fits {
         Ok(())

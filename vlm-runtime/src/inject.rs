@@ -1,10 +1,11 @@
 //! inject: phase 1, from the direct light at the points to the radiosity of lights and of the grid's sources.
 
+use vlm_shaders::tables::GridHeader;
 use vlm_shaders::wgsl;
-use wgpu::{BindGroup, BindGroupLayout, CommandEncoder, ComputePipeline, Device};
+use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, Device};
 
 use crate::error::Error;
-use crate::pass::{self, dispatch, group, layout, storage, workgroups};
+use crate::pass::{self, Passes, Worklist, group, layout, some_workgroups, storage, workgroups};
 use crate::upload::Uploaded;
 
 /// The pass for any asset.
@@ -24,17 +25,19 @@ impl InjectPipeline {
 /// The pass for an asset.
 pub(crate) struct Inject {
     group: BindGroup,
-    workgroups: u32,
+    /// Lights, then pieces of surface without one.
+    pub work: Worklist,
 }
 
 impl Inject {
-    /// `elements`: lights and pieces of surface without one.
     pub(crate) fn new(
         device: &Device,
         pipeline: &InjectPipeline,
         uploaded: &Uploaded,
-        elements: usize,
+        header: &GridHeader,
     ) -> Result<Self, Error> {
+        let elements = (header.light_count + header.uncovered_count) as usize;
+        workgroups(device, "inject", elements)?;
         let bound = [
             (0, &uploaded.samples),
             (1, &uploaded.uncovered),
@@ -45,10 +48,14 @@ impl Inject {
             (6, &uploaded.source_radiosity),
         ];
         let group = group(device, "inject", &pipeline.layout, &bound);
-        Ok(Self { group, workgroups: workgroups(device, "inject", elements)? })
+        Ok(Self { group, work: Worklist::new(header.injected, elements) })
     }
 
-    pub(crate) fn record(&self, encoder: &mut CommandEncoder, pipeline: &InjectPipeline, common: &BindGroup) {
-        dispatch(encoder, "inject", &pipeline.pipeline, &[common, &self.group], [self.workgroups, 1]);
+    /// Does what was planned, if anything.
+    pub(crate) fn record(&mut self, passes: &mut Passes<'_>, pipeline: &InjectPipeline, common: &BindGroup) {
+        let workgroups = some_workgroups(self.work.take());
+        if workgroups > 0 {
+            passes.add("inject", &pipeline.pipeline, &[common, &self.group], [workgroups, 1]);
+        }
     }
 }

@@ -1,9 +1,13 @@
 //! Layouts, pipelines and buffers, with the limits that they keep.
 
 use wgpu::util::DeviceExt as _;
-use wgpu::{BindGroup, BindGroupLayout, BindingType, Buffer, BufferUsages, ComputePipeline, Device};
+use wgpu::{BindGroup, BindGroupLayout, BindingType, Buffer, BufferUsages, ComputePipeline, Device, Queue};
 
+use crate::direct::write;
 use crate::error::{Error, within};
+use crate::timer::Timer;
+use crate::upload::list_words;
+use vlm_shaders::tables::ALL;
 
 /// Invocations per workgroup of the passes over lights and probes, as in the shaders.
 const WORKGROUP: u32 = 64;
@@ -115,8 +119,18 @@ impl Buffers<'_> {
 
     fn filled(&mut self, label: &str, contents: &[u8], usage: BufferUsages) -> Result<Buffer, Error> {
         let contents = if contents.is_empty() { &[0; LEAST_BYTES as usize] } else { contents };
-        self.check(label, contents.len() as u64)?;
         self.bytes += contents.len() as u64;
+        self.contents(label, contents, usage)
+    }
+
+    /// A buffer with contents, not empty, whose bytes are not counted.
+    pub(crate) fn contents(
+        &self,
+        label: &str,
+        contents: &[u8],
+        usage: BufferUsages,
+    ) -> Result<Buffer, Error> {
+        self.check(label, contents.len() as u64)?;
         let usage = usage | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         let label = Some(label);
         Ok(self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label, contents, usage }))
@@ -141,6 +155,61 @@ impl Buffers<'_> {
     }
 }
 
+/// A list of what a pass works on, at a place of `indices`: as `listed` in the shaders reads it.
+pub(crate) struct Worklist {
+    /// Where it begins.
+    start: u32,
+    /// All that there are.
+    total: usize,
+    /// How long the list on the device is, or [`ALL`].
+    on_device: u32,
+    /// How many the next pass works on; 0 for no pass.
+    planned: usize,
+}
+
+impl Worklist {
+    pub(crate) fn new(start: u32, total: usize) -> Self {
+        Self { start, total, on_device: ALL, planned: 0 }
+    }
+
+    /// The next pass works on these, or on all; bytes written.
+    pub(crate) fn plan(&mut self, queue: &Queue, indices: &Buffer, list: Option<&[u32]>) -> u64 {
+        self.planned = list.map_or(self.total, <[u32]>::len);
+        let Some(list) = list else {
+            if self.on_device == ALL {
+                return 0;
+            }
+            self.on_device = ALL;
+            return write(queue, indices, self.start as usize, &[ALL]);
+        };
+        if list.is_empty() {
+            return 0;
+        }
+        self.on_device = list.len() as u32;
+        write(queue, indices, self.start as usize, &list_words(list))
+    }
+
+    /// How many the next pass works on, once.
+    pub(crate) fn take(&mut self) -> usize {
+        std::mem::take(&mut self.planned)
+    }
+
+    /// All that there are.
+    pub(crate) fn total(&self) -> usize {
+        self.total
+    }
+
+    /// Whether the next pass works on all.
+    pub(crate) fn is_all(&self) -> bool {
+        self.on_device == ALL
+    }
+}
+
+/// How many workgroups of a pass these elements take, which fit the device all together.
+pub(crate) fn some_workgroups(elements: usize) -> u32 {
+    u32::try_from((elements as u64).div_ceil(u64::from(WORKGROUP))).unwrap_or(u32::MAX)
+}
+
 /// How many workgroups a pass of one invocation per element takes.
 pub(crate) fn workgroups(device: &Device, what: &str, elements: usize) -> Result<u32, Error> {
     let groups = (elements as u64).div_ceil(u64::from(WORKGROUP));
@@ -154,17 +223,60 @@ pub(crate) fn workgroups(device: &Device, what: &str, elements: usize) -> Result
     Ok(u32::try_from(groups).unwrap_or(u32::MAX))
 }
 
-/// Adds one dispatch.
-pub(crate) fn dispatch(
-    encoder: &mut wgpu::CommandEncoder,
-    label: &str,
-    pipeline: &ComputePipeline,
-    groups: &[&BindGroup],
-    [x, y]: [u32; 2],
-) {
-    let descriptor = wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes: None };
-    let mut pass = encoder.begin_compute_pass(&descriptor);
-    pass.set_pipeline(pipeline);
-    (0..).zip(groups).for_each(|(number, group)| pass.set_bind_group(number, *group, &[]));
-    pass.dispatch_workgroups(x, y, 1);
+/// The passes of a frame, as they are added to an encoder.
+pub(crate) struct Passes<'a> {
+    encoder: &'a mut wgpu::CommandEncoder,
+    timer: Option<&'a mut Timer>,
+    /// Of this frame, in order.
+    pub names: Vec<&'static str>,
+}
+
+impl<'a> Passes<'a> {
+    pub(crate) fn new(encoder: &'a mut wgpu::CommandEncoder, timer: Option<&'a mut Timer>) -> Self {
+        Self { encoder, timer, names: Vec::new() }
+    }
+
+    /// Adds a pass of one dispatch.
+    pub(crate) fn add(
+        &mut self,
+        name: &'static str,
+        pipeline: &ComputePipeline,
+        groups: &[&BindGroup],
+        workgroups: [u32; 2],
+    ) {
+        self.add_each(name, pipeline, &[groups], workgroups);
+    }
+
+    /// Adds a pass of a dispatch for each of several lists of groups, one after the other.
+    pub(crate) fn add_each(
+        &mut self,
+        name: &'static str,
+        pipeline: &ComputePipeline,
+        dispatches: &[&[&BindGroup]],
+        [x, y]: [u32; 2],
+    ) {
+        let timestamp_writes = self.timer.as_ref().and_then(|timer| timer.writes(self.names.len()));
+        let descriptor = wgpu::ComputePassDescriptor { label: Some(name), timestamp_writes };
+        let mut pass = self.encoder.begin_compute_pass(&descriptor);
+        pass.set_pipeline(pipeline);
+        for groups in dispatches {
+            (0..).zip(*groups).for_each(|(number, group)| pass.set_bind_group(number, *group, &[]));
+            pass.dispatch_workgroups(x, y, 1);
+        }
+        drop(pass);
+        self.names.push(name);
+    }
+
+    /// Sets a buffer to zeros.
+    pub(crate) fn clear(&mut self, buffer: &Buffer) {
+        self.encoder.clear_buffer(buffer, 0, None);
+    }
+
+    /// Sends the times back; the names of the passes.
+    pub(crate) fn finish(self, frame: u64) -> Vec<&'static str> {
+        if let Some(timer) = self.timer {
+            timer.finish(self.encoder, frame, &self.names);
+        }
+        self.names
+    }
 }

@@ -1,17 +1,29 @@
-//! refresh: what arrives at the probes of an asset with a grid.
+//! refresh: what arrives at the probes of an asset with a grid, on surface and in free space.
 
+use vlm_shaders::tables::GridHeader;
 use vlm_shaders::wgsl;
-use wgpu::{BindGroup, BindGroupLayout, CommandEncoder, ComputePipeline, Device};
+use wgpu::{BindGroup, BindGroupLayout, Buffer, ComputePipeline, Device};
 
+use crate::dependents::Dependents;
 use crate::error::Error;
-use crate::pass::{self, dispatch, group, layout, storage, workgroups};
+use crate::pass::{self, Passes, Worklist, group, layout, some_workgroups, storage, workgroups};
 use crate::upload::{GridBuffers, Uploaded};
 
-/// The pass for an asset.
+/// The passes for an asset.
 pub(crate) struct Refresh {
+    surface: Pass,
+    /// Of probes in free space, where there are any.
+    free: Option<Pass>,
+    free_probes: usize,
+    /// Probes.
+    pub work: Worklist,
+    /// Which probes a change reaches.
+    pub dependents: Dependents,
+}
+
+struct Pass {
     pipeline: ComputePipeline,
     group: BindGroup,
-    workgroups: u32,
 }
 
 impl Refresh {
@@ -20,10 +32,10 @@ impl Refresh {
         common: &BindGroupLayout,
         uploaded: &Uploaded,
         grid: &GridBuffers,
-        probes: usize,
+        (header, dependents): (&GridHeader, Dependents),
     ) -> Result<Self, Error> {
-        let bindings = [0, 1, 2, 3, 4, 5, 6].map(|binding| (binding, storage(binding < 5)));
-        let layout = layout(device, "refresh", &bindings);
+        let probes = header.probe_count as usize;
+        workgroups(device, "refresh", probes)?;
         let bound = [
             (0, &grid.probes),
             (1, &grid.rows),
@@ -33,14 +45,50 @@ impl Refresh {
             (5, &grid.far),
             (6, &grid.near_radiosities),
         ];
+        let free = grid.free.as_ref().map(|free| {
+            let bound = [bound[0], bound[1], bound[3], bound[4], (5, free)];
+            Pass::new(device, common, ("refresh_free", &wgsl::refresh_free()), &bound)
+        });
         Ok(Self {
-            group: group(device, "refresh", &layout, &bound),
-            pipeline: pass::pipeline(device, "refresh", &wgsl::refresh(), &[common, &layout]),
-            workgroups: workgroups(device, "refresh", probes)?,
+            surface: Pass::new(device, common, ("refresh", &wgsl::refresh()), &bound),
+            free,
+            free_probes: probes - (header.surface_probes as usize).min(probes),
+            work: Worklist::new(header.refreshed, probes),
+            dependents,
         })
     }
 
-    pub(crate) fn record(&self, encoder: &mut CommandEncoder, common: &BindGroup) {
-        dispatch(encoder, "refresh", &self.pipeline, &[common, &self.group], [self.workgroups, 1]);
+    /// Does what was planned, if anything; how many probes that is.
+    pub(crate) fn record(&mut self, passes: &mut Passes<'_>, common: &BindGroup) -> u32 {
+        let probes = self.work.take();
+        if probes == 0 {
+            return 0;
+        }
+        self.surface.record(passes, "refresh", common, probes);
+        if let Some(free) = &self.free {
+            // Lists hold probes of both kinds.
+            let probes = if self.work.is_all() { self.free_probes } else { probes };
+            free.record(passes, "refresh_free", common, probes);
+        }
+        probes as u32
+    }
+}
+
+impl Pass {
+    /// The first five bindings are read, those after them written.
+    fn new(
+        device: &Device,
+        common: &BindGroupLayout,
+        (name, source): (&str, &str),
+        bound: &[(u32, &Buffer)],
+    ) -> Self {
+        let bindings: Vec<_> = bound.iter().map(|&(binding, _)| (binding, storage(binding < 5))).collect();
+        let layout = layout(device, name, &bindings);
+        let pipeline = pass::pipeline(device, name, source, &[common, &layout]);
+        Self { group: group(device, name, &layout, bound), pipeline }
+    }
+
+    fn record(&self, passes: &mut Passes<'_>, name: &'static str, common: &BindGroup, probes: usize) {
+        passes.add(name, &self.pipeline, &[common, &self.group], [some_workgroups(probes), 1]);
     }
 }

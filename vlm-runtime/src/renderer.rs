@@ -1,57 +1,42 @@
 //! The renderer: which passes a frame needs, in order.
 
-use std::ops::Range;
-
-use glam::{DMat4, Vec3};
+use glam::Vec3;
 use vlm_format::Grid;
-use vlm_shaders::cpu::direct::{Point, points};
-use vlm_shaders::tables::LightSurface;
+use vlm_shaders::cpu::direct::Point;
 use vlm_shaders::wgsl::Gathering;
 use wgpu::{BindGroup, BindGroupLayout, CommandEncoder, Device, Queue};
 
 use crate::changes::Changes;
+use crate::dependents::Dependents;
 use crate::device::check_limits;
-use crate::direct::{Direct, DirectPipeline, write};
+use crate::direct::{Direct, DirectPipeline};
 use crate::error::Error;
-use crate::frame::{Frame, MovedNode, Settings, Targets, Visibility};
+use crate::frame::{Frame, Settings, Targets};
 use crate::gather::Gather;
 use crate::inject::{Inject, InjectPipeline};
-use crate::load::{VlmAsset, world_lights};
-use crate::pass::{Buffers, group, layout, storage, uniform};
+use crate::load::VlmAsset;
+use crate::loaded::{Loaded, reflectances, shining};
+use crate::pass::{Buffers, Passes, group, layout, storage, uniform};
 use crate::refresh::Refresh;
-use crate::stats::FrameStats;
-use crate::upload::{Host, Uploaded, check_listed, check_real_lights, list_words};
+use crate::shadow::{Shadow, ShadowPipeline};
+use crate::stats::{FrameStats, FrameTimes};
+use crate::timer::Timer;
+use crate::upload::Uploaded;
 
 /// Finds the indirect light of frames, on one device.
 ///
-/// [`VlmRenderer::load`] an asset, then for each frame [`VlmRenderer::prepare`] and [`VlmRenderer::record`].
+/// [`VlmRenderer::load`] an asset, then for each frame [`VlmRenderer::prepare`] and [`VlmRenderer::record`], and submit the encoder before the next
+/// frame is prepared.
 pub struct VlmRenderer {
     device: Device,
     settings: Settings,
     /// Bind group 0 of the passes over the grid.
     common: BindGroupLayout,
+    shadow: ShadowPipeline,
     direct: DirectPipeline,
     inject: InjectPipeline,
+    timer: Option<Timer>,
     loaded: Option<Loaded>,
-}
-
-/// An asset on the device.
-struct Loaded {
-    asset: VlmAsset,
-    host: Host,
-    uploaded: Uploaded,
-    common: BindGroup,
-    direct: Direct,
-    inject: Inject,
-    refresh: Option<Refresh>,
-    gather: Gather,
-    changes: Changes,
-    /// Nodes that are not at rest.
-    moved: Vec<MovedNode>,
-    /// The radiosity of lights is to be found anew.
-    is_stale: bool,
-    is_prepared: bool,
-    stats: FrameStats,
 }
 
 impl VlmRenderer {
@@ -63,9 +48,11 @@ impl VlmRenderer {
         check_limits(&device.limits())?;
         let common = layout(device, "common", &[(0, uniform()), (1, storage(true))]);
         Ok(Self {
+            shadow: ShadowPipeline::new(device),
             direct: DirectPipeline::new(device),
             inject: InjectPipeline::new(device, &common),
             device: device.clone(),
+            timer: settings.time_passes.then(|| Timer::new(device)).flatten(),
             settings,
             common,
             loaded: None,
@@ -86,15 +73,16 @@ impl VlmRenderer {
         let pieces: Vec<Vec3> = grid.map_or_else(Vec::new, reflectances);
         let changes = Changes::new(&asset.lights, &pieces, &host.points);
         let (points, spans) = (host.points.len(), changes.span_count());
-        let elements = asset.lights.len() + pieces.len();
         let gathering = self.gathering(asset, grid);
         let refresh = uploaded.grid.as_ref().zip(grid).map(|(buffers, grid)| {
-            Refresh::new(&self.device, &self.common, &uploaded, buffers, grid.probes.len())
+            let dependents = Dependents::new(grid, &asset.lights);
+            Refresh::new(&self.device, &self.common, &uploaded, buffers, (&host.header, dependents))
         });
         let mut loaded = Loaded {
             common: group(&self.device, "common", &self.common, &header),
+            shadow: Shadow::default(),
             direct: Direct::new(&self.direct, buffers, &uploaded, points, spans)?,
-            inject: Inject::new(&self.device, &self.inject, &uploaded, elements)?,
+            inject: Inject::new(&self.device, &self.inject, &uploaded, &host.header)?,
             refresh: refresh.transpose()?,
             gather: Gather::new(buffers, &self.common, &uploaded, gathering, &self.settings)?,
             asset: asset.clone(),
@@ -111,6 +99,8 @@ impl VlmRenderer {
             bytes_uploaded: buffers.bytes,
             uses_grid: gathering.grid,
             uses_tags: gathering.tags,
+            uses_free_probes: gathering.free,
+            probes: grid.map_or(0, |grid| grid.probes.len() as u32),
             ..FrameStats::default()
         };
         self.loaded = Some(loaded);
@@ -120,7 +110,8 @@ impl VlmRenderer {
     fn gathering(&self, asset: &VlmAsset, grid: Option<&Grid>) -> Gathering {
         let listed = grid.is_none() || self.settings.moving_nodes;
         let tags = listed && asset.lights.tags.iter().any(|tag| *tag != 0);
-        Gathering { grid: grid.is_some(), listed, tags }
+        let free = grid.is_some_and(|grid| grid.probes.len() > grid.surface_probes as usize);
+        Gathering { grid: grid.is_some(), listed, tags, free }
     }
 
     /// The points for which [`Visibility`] is given, world space: the lights' samples, then surface without a light.
@@ -134,18 +125,19 @@ impl VlmRenderer {
     /// Says what the next frame shows, and writes what changed since the last one to the device.
     ///
     /// # Errors
-    /// [`Error::NotLoaded`]; [`Error::VisibilityLength`]; [`Error::MovingOff`] and [`Error::UnknownNode`] for nodes that cannot move;
+    /// [`Error::NotLoaded`]; [`Error::VisibilityLength`]; [`Error::UnknownLight`] and [`Error::Target`] for shadow maps; [`Error::MovingOff`] and [`Error::UnknownNode`] for nodes that cannot move;
     /// [`Error::NotFinite`]; [`Error::Limit`] for too many lights. The last frame then stays prepared.
     pub fn prepare(&mut self, queue: &Queue, frame: &Frame<'_>) -> Result<(), Error> {
         let moving_nodes = self.settings.moving_nodes;
         let loaded = self.loaded.as_mut().ok_or(Error::NotLoaded)?;
         let buffers = Buffers { device: &self.device, bytes: 0 };
-        loaded.check(frame, moving_nodes)?;
-        if let Visibility::Given(visibility) = frame.visibility {
-            buffers.check("visibility", size_of_val(visibility) as u64)?;
+        loaded.check(frame, &buffers, moving_nodes)?;
+        if let Some(timer) = &mut self.timer {
+            timer.collect(&self.device, queue)?;
         }
         let mut bytes = loaded.move_nodes(queue, frame.moved)?;
-        bytes += loaded.write_direct(queue, (&buffers, &self.direct), frame)?;
+        bytes += loaded.write_direct(queue, &buffers, (&self.shadow, &self.direct), frame)?;
+        bytes += loaded.plan(queue);
         bytes += loaded.gather.write_view(queue, frame.view);
         loaded.stats.bytes_uploaded += bytes;
         loaded.is_prepared = true;
@@ -162,11 +154,7 @@ impl VlmRenderer {
         targets: &Targets<'_>,
     ) -> Result<FrameStats, Error> {
         self.loaded()?.gather.check(targets, &self.device)?;
-        let mut stats = self.record_light(encoder)?;
-        let loaded = self.loaded.as_ref().ok_or(Error::NotLoaded)?;
-        loaded.gather.record(encoder, &self.device, &loaded.common, targets);
-        stats.passes.push("gather");
-        Ok(stats)
+        self.record_frame(encoder, Some(targets))
     }
 
     /// [`VlmRenderer::record`] without the gather, for forward shaders that call `indirect` themselves.
@@ -174,27 +162,37 @@ impl VlmRenderer {
     /// # Errors
     /// [`Error::NotLoaded`], [`Error::NotPrepared`].
     pub fn record_light(&mut self, encoder: &mut CommandEncoder) -> Result<FrameStats, Error> {
+        self.record_frame(encoder, None)
+    }
+
+    fn record_frame(
+        &mut self,
+        encoder: &mut CommandEncoder,
+        targets: Option<&Targets<'_>>,
+    ) -> Result<FrameStats, Error> {
         let loaded = self.loaded.as_mut().ok_or(Error::NotLoaded)?;
         if !loaded.is_prepared {
             return Err(Error::NotPrepared);
         }
         let mut stats = loaded.take_stats();
-        if loaded.direct.record(encoder, &self.direct) {
-            stats.passes.push("direct");
+        stats.times = self.timer.as_ref().and_then(Timer::newest).cloned();
+        let mut passes = Passes::new(encoder, self.timer.as_mut());
+        stats.shadow_maps = loaded.shadow.record(&mut passes, &self.shadow);
+        loaded.direct.record(&mut passes, &self.direct);
+        loaded.inject.record(&mut passes, &self.inject, &loaded.common);
+        if let Some(refresh) = &mut loaded.refresh {
+            stats.probes_refreshed = refresh.record(&mut passes, &loaded.common);
         }
-        if std::mem::take(&mut loaded.is_stale) {
-            loaded.inject.record(encoder, &self.inject, &loaded.common);
-            stats.passes.push("inject");
-            if let Some(refresh) = &loaded.refresh {
-                refresh.record(encoder, &loaded.common);
-                stats.passes.push("refresh");
-            }
+        if let Some(targets) = targets {
+            loaded.gather.record(&mut passes, &self.device, &loaded.common, targets);
         }
+        stats.passes = passes.finish(stats.frame);
         Ok(stats)
     }
 
     /// The WGSL function `indirect(position, normal, geometric_normal, tag) -> Gathered` for a forward shader, which binds
-    /// [`VlmRenderer::forward_groups`] at `first_group` and the next. `Gathered.irradiance` is in lx.
+    /// [`VlmRenderer::forward_groups`] at `first_group` and the next; and `indirect_moving` of the same parameters for what moves, as
+    /// [`Targets::moving`] says. `Gathered.irradiance` is in lx.
     ///
     /// # Errors
     /// [`Error::NotLoaded`].
@@ -252,6 +250,29 @@ impl VlmRenderer {
         Ok(irradiance)
     }
 
+    /// The share of each real light that each point sees: `light * points + point`, as it was given or as shadow maps gave it; empty before the
+    /// first. Waits for the device.
+    ///
+    /// # Errors
+    /// [`Error::NotLoaded`], [`Error::Device`] if the device is lost.
+    pub fn visibility(&self, queue: &Queue) -> Result<Vec<f32>, Error> {
+        let loaded = self.loaded()?;
+        let mut visibility = self.read(queue, loaded.direct.points_and_visibility().1)?;
+        visibility.truncate(loaded.changes.visibility_len());
+        Ok(visibility)
+    }
+
+    /// The times of the newest frame that was submitted, of those with [`Settings::time_passes`]; waits for the device, which
+    /// [`FrameStats::times`] does not. `None` where no frame was timed.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device is lost.
+    pub fn wait_for_times(&mut self, queue: &Queue) -> Result<Option<FrameTimes>, Error> {
+        let Some(timer) = &mut self.timer else { return Ok(None) };
+        timer.wait(&self.device, queue)?;
+        Ok(timer.newest().cloned())
+    }
+
     fn read<T: bytemuck::Pod>(&self, queue: &Queue, buffer: &wgpu::Buffer) -> Result<Vec<T>, Error> {
         let failed = |error: &dyn std::fmt::Display| Error::Device(error.to_string());
         let back = self.device.create_buffer(&wgpu::BufferDescriptor {
@@ -273,159 +294,4 @@ impl VlmRenderer {
     fn loaded(&self) -> Result<&Loaded, Error> {
         self.loaded.as_ref().ok_or(Error::NotLoaded)
     }
-}
-
-impl Loaded {
-    fn check(&self, frame: &Frame<'_>, moving_nodes: bool) -> Result<(), Error> {
-        check_finite(frame)?;
-        check_real_lights(frame.lights.len())?;
-        let (lights, points) = (frame.lights.len(), self.host.points.len());
-        let found = match frame.visibility {
-            Visibility::Given(visibility) => Some(visibility.len()),
-            Visibility::Kept => self.changes.has_visibility().then(|| self.changes.visibility_len()),
-        };
-        if let Some(found) = found.filter(|&found| found != lights * points) {
-            let (found, lights, points) = (found as u64, lights as u32, points as u32);
-            return Err(Error::VisibilityLength { found, lights, points });
-        }
-        if !frame.moved.is_empty() && !moving_nodes {
-            return Err(Error::MovingOff);
-        }
-        let vlms = &self.asset.asset.vlms;
-        match frame.moved.iter().find(|moved| !vlms.iter().any(|vlm| vlm.node == moved.node)) {
-            Some(&MovedNode { node, .. }) => Err(Error::UnknownNode { node }),
-            None => Ok(()),
-        }
-    }
-
-    /// Writes the real lights and their visibility where they changed, and which points that lights anew; bytes written.
-    fn write_direct(
-        &mut self,
-        queue: &Queue,
-        on: (&Buffers, &DirectPipeline),
-        frame: &Frame<'_>,
-    ) -> Result<u64, Error> {
-        let mut bytes = 0;
-        if self.changes.light(frame.lights) {
-            bytes += self.direct.write_lights(queue, frame.lights);
-        }
-        if let Visibility::Given(visibility) = frame.visibility {
-            let changed = self.changes.see(visibility);
-            bytes += self.direct.write_visibility(queue, on, visibility, &changed)?;
-        }
-        let spans = self.changes.dirty();
-        self.is_stale |= !spans.is_empty();
-        let header = (frame.lights.len(), self.changes.has_visibility());
-        Ok(bytes + self.direct.write_spans(queue, on.0.device, &spans, header)?)
-    }
-
-    /// Moves the lights of nodes that are elsewhere than in the last frame; bytes written.
-    fn move_nodes(&mut self, queue: &Queue, moved: &[MovedNode]) -> Result<u64, Error> {
-        let at_rest = |m: &&MovedNode| self.rest(m.node) != Some(m.world_from_node);
-        let moved: Vec<MovedNode> = moved.iter().filter(at_rest).copied().collect();
-        if moved == self.moved {
-            return Ok(0);
-        }
-        let listed = self.lights_of(&moved);
-        if self.refresh.is_some() {
-            check_listed(listed.len())?;
-        }
-        let place =
-            |moved: &[MovedNode], node: u32| moved.iter().find(|m| m.node == node).map(|m| m.world_from_node);
-        let elsewhere: Vec<Range<u32>> = self
-            .asset
-            .asset
-            .vlms
-            .iter()
-            .filter(|vlm| place(&moved, vlm.node) != place(&self.moved, vlm.node))
-            .map(|vlm| vlm.lights[0]..vlm.lights[0].saturating_add(vlm.lights[1]))
-            .collect();
-        let now = |node| place(&moved, node).or_else(|| self.rest(node));
-        self.host.lights = world_lights(&self.asset.asset, now);
-        let uncovered =
-            self.host.points.split_off(self.host.lights.samples.len().min(self.host.points.len()));
-        self.host.points = points(&self.host.lights, &[]);
-        self.host.points.extend(uncovered);
-        self.moved = moved;
-        self.is_stale = true;
-        let bytes: u64 = elsewhere.into_iter().map(|lights| self.write_moved(queue, lights)).sum();
-        Ok(bytes + self.write_listed(queue, &listed))
-    }
-
-    fn rest(&self, node: u32) -> Option<DMat4> {
-        self.asset.world_from_node.get(node as usize).copied()
-    }
-
-    fn lights_of(&self, moved: &[MovedNode]) -> Vec<u32> {
-        let is_moved = |node| moved.iter().any(|m| m.node == node);
-        let vlms = self.asset.asset.vlms.iter().filter(|vlm| is_moved(vlm.node));
-        vlms.flat_map(|vlm| vlm.lights[0]..vlm.lights[0].saturating_add(vlm.lights[1])).collect()
-    }
-
-    /// Writes where some lights are, and their points; bytes written.
-    fn write_moved(&mut self, queue: &Queue, lights: Range<u32>) -> u64 {
-        let Host { lights: set, points, .. } = &self.host;
-        let starts = |light: u32| set.sample_starts.get(light as usize).map_or(0, |&start| start as usize);
-        let (first, samples) = (lights.start as usize, starts(lights.start)..starts(lights.end));
-        let geometry = set.geometry.get(first..lights.end as usize).unwrap_or(&[]);
-        let own_points = points.get(samples.clone()).unwrap_or(&[]);
-        let bytes = write(queue, &self.uploaded.geometry, first, geometry)
-            + write(queue, &self.uploaded.points, samples.start, own_points);
-        self.changes.moved(lights, points);
-        bytes
-    }
-
-    /// Lists the lights that moved, and takes them out of the grid, which has their light where they were; bytes written.
-    fn write_listed(&self, queue: &Queue, listed: &[u32]) -> u64 {
-        if self.refresh.is_none() {
-            return 0;
-        }
-        let mut surfaces: Vec<LightSurface> = self.host.light_surfaces.clone();
-        for &light in listed {
-            if let Some(surface) = surfaces.get_mut(light as usize) {
-                surface.gain = 0.0;
-            }
-        }
-        write(queue, &self.uploaded.light_surfaces, 0, &surfaces)
-            + write(queue, &self.uploaded.listed, 0, &list_words(listed))
-    }
-
-    /// The numbers of this frame; those of the next begin at 0.
-    fn take_stats(&mut self) -> FrameStats {
-        let (lights_injected, lights_skipped) = self.changes.counts();
-        self.changes.clean();
-        let stats = FrameStats { lights_injected, lights_skipped, ..self.stats.clone() };
-        self.stats.bytes_uploaded = 0;
-        stats
-    }
-}
-
-fn reflectances(grid: &Grid) -> Vec<Vec3> {
-    grid.uncovered.iter().map(|piece| piece.reflectance).collect()
-}
-
-/// The lights that may ever shine.
-fn shining(asset: &VlmAsset) -> Vec<u32> {
-    let set = &asset.lights;
-    let shines = |&light: &u32| {
-        let emits = set.emission.get(light as usize).is_some_and(|emission| *emission != Vec3::ZERO);
-        emits || set.samples_of(light as usize).iter().any(|sample| sample.reflectance != Vec3::ZERO)
-    };
-    (0..set.len() as u32).filter(shines).collect()
-}
-
-/// All numbers of a frame count, since one that is not finite spreads over the picture.
-fn check_finite(frame: &Frame<'_>) -> Result<(), Error> {
-    let finite =
-        |what: String, is_finite: bool| if is_finite { Ok(()) } else { Err(Error::NotFinite { what }) };
-    for (number, light) in frame.lights.iter().enumerate() {
-        let vectors = [light.position, light.direction, light.intensity].iter().all(|v| v.is_finite());
-        let cone = light.cone_scale.is_finite() && light.cone_offset.is_finite() && !light.range.is_nan();
-        finite(format!("light {number}"), vectors && cone)?;
-    }
-    for moved in frame.moved {
-        finite(format!("the transform of node {}", moved.node), moved.world_from_node.is_finite())?;
-    }
-    finite("the camera".to_owned(), frame.view.world_from_clip.is_finite())?;
-    finite("the exposure".to_owned(), frame.view.exposure.is_finite())
 }

@@ -3,9 +3,10 @@
 use glam::Vec4;
 use vlm_format::Grid;
 use vlm_shaders::cpu::direct::{Point, points};
+use vlm_shaders::cpu::free_light::FreeLight;
 use vlm_shaders::cpu::refresh::{FarLight, far_sources};
 use vlm_shaders::cpu::upload::LightSet;
-use vlm_shaders::tables::{GridTables, LightSurface};
+use vlm_shaders::tables::{GridHeader, GridTables, LightSurface};
 use wgpu::Buffer;
 
 use crate::error::{Error, within};
@@ -31,8 +32,6 @@ pub(crate) struct Uploaded {
     pub irradiance: Buffer,
     pub light_radiosity: Buffer,
     pub source_radiosity: Buffer,
-    /// How many lights are summed at every pixel, then their numbers.
-    pub listed: Buffer,
     pub grid: Option<GridBuffers>,
 }
 
@@ -44,6 +43,8 @@ pub(crate) struct GridBuffers {
     pub sources: Buffer,
     pub far: Buffer,
     pub near_radiosities: Buffer,
+    /// The light of probes in free space, where there are any.
+    pub free: Option<Buffer>,
 }
 
 /// The same on the processor, for what changes from frame to frame.
@@ -54,6 +55,8 @@ pub(crate) struct Host {
     pub points: Vec<Point>,
     /// With the grid's gains.
     pub light_surfaces: Vec<LightSurface>,
+    /// Where the lists of `indices` begin.
+    pub header: GridHeader,
 }
 
 impl Uploaded {
@@ -66,7 +69,10 @@ impl Uploaded {
     ) -> Result<(Self, Host), Error> {
         let none = Grid::default();
         let all = grid.unwrap_or(&none);
-        let GridTables { header, indices, light_surfaces } = GridTables::new(all, lights);
+        check_listed(listed.len())?;
+        let GridTables { header, mut indices, light_surfaces } = GridTables::new(all, lights);
+        let summed = indices.iter_mut().skip(header.summed as usize);
+        summed.zip(list_words(listed)).for_each(|(to, word)| *to = word);
         let points = points(lights, &all.uncovered);
         let sources = points.len() + lights.len();
         let vectors = |count: usize| (count * size_of::<Vec4>()) as u64;
@@ -84,18 +90,9 @@ impl Uploaded {
             irradiance: buffers.zeros("irradiance", vectors(points.len()))?,
             light_radiosity: buffers.zeros("light_radiosity", vectors(lights.len()))?,
             source_radiosity: buffers.zeros("source_radiosity", vectors(sources))?,
-            listed: Self::list(buffers, lights.len(), listed)?,
             grid: grid.map(|grid| GridBuffers::new(buffers, lights, grid)).transpose()?,
         };
-        Ok((uploaded, Host { lights: lights.clone(), points, light_surfaces }))
-    }
-
-    /// Room for all lights, as any of them may move.
-    fn list(buffers: &mut Buffers, lights: usize, listed: &[u32]) -> Result<Buffer, Error> {
-        check_listed(listed.len())?;
-        let mut words = list_words(listed);
-        words.resize(lights + 1, 0);
-        buffers.input("listed", &words)
+        Ok((uploaded, Host { lights: lights.clone(), points, light_surfaces, header }))
     }
 }
 
@@ -103,6 +100,7 @@ impl GridBuffers {
     fn new(buffers: &mut Buffers, lights: &LightSet, grid: &Grid) -> Result<Self, Error> {
         let far = grid.surface_probes as usize * size_of::<FarLight>();
         let near = grid.near.len() * size_of::<Vec4>();
+        let free = grid.probes.len().saturating_sub(grid.surface_probes as usize) * size_of::<FreeLight>();
         Ok(Self {
             probes: buffers.input("probes", &grid.probes)?,
             rows: buffers.input("rows", &grid.rows)?,
@@ -110,6 +108,7 @@ impl GridBuffers {
             sources: buffers.input("sources", &far_sources(lights, &grid.uncovered))?,
             far: buffers.zeros("far", far as u64)?,
             near_radiosities: buffers.zeros("near_radiosities", near as u64)?,
+            free: (free > 0).then(|| buffers.zeros("free", free as u64)).transpose()?,
         })
     }
 }

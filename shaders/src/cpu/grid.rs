@@ -1,7 +1,7 @@
 //! The leaf of the static grid that holds a point, and the weights of its probes there.
 
 use glam::Vec3;
-use vlm_format::{Grid, MOST_PROBES};
+use vlm_format::{Grid, MOST_PROBES, Probe};
 
 use super::gather::Receiver;
 
@@ -64,19 +64,35 @@ pub fn blend(grid: &Grid, leaf: u32, receiver: &Receiver) -> Blend {
     let Some(lists) = grid.leaves.get(leaf as usize) else { return blend };
     blend.first = lists.probes;
     blend.count = (lists.free_probes - lists.probes).min(MOST_PROBES as u32);
-    let mut strays = [0.0; MOST_PROBES];
-    let (mut sum, mut stray_sum) = (0.0, 0.0);
-    for i in 0..blend.count {
-        let probe = grid.leaf_probes.get((blend.first + i) as usize);
-        let Some(probe) = probe.and_then(|&probe| grid.probes.get(probe as usize)) else { continue };
-        let local = probe.local(receiver.position);
-        let weight = probe.normal_weight(receiver.normal) * probe.place_weight(local);
-        let stray = probe.stray_weight(local, receiver.normal);
-        (blend.weights[i as usize], strays[i as usize]) = (weight, stray);
+    let mut sum = 0.0;
+    for i in 0..blend.count as usize {
+        let weight = probe_of(grid, &blend, i).map_or(0.0, |probe| weight_of(probe, receiver));
+        blend.weights[i] = weight;
         sum += weight;
-        stray_sum += stray;
     }
-    // Where reaches end, strays fade in.
+    if sum >= FIRM {
+        blend.weights.iter_mut().for_each(|weight| *weight *= 1.0 / sum);
+    } else {
+        add_strays(grid, &mut blend, sum, receiver);
+    }
+    blend
+}
+
+/// Most of a leaf's probes face elsewhere, so that is asked first.
+fn weight_of(probe: &Probe, receiver: &Receiver) -> f32 {
+    let facing = probe.normal_weight(receiver.normal);
+    if facing > 0.0 { facing * probe.place_weight(probe.local(receiver.position)) } else { 0.0 }
+}
+
+/// Where reaches end, strays fade in.
+fn add_strays(grid: &Grid, blend: &mut Blend, sum: f32, receiver: &Receiver) {
+    let mut strays = [0.0; MOST_PROBES];
+    let mut stray_sum = 0.0;
+    for (i, stray) in strays.iter_mut().enumerate().take(blend.count as usize) {
+        let Some(probe) = probe_of(grid, blend, i) else { continue };
+        *stray = probe.stray_weight(probe.local(receiver.position), receiver.normal);
+        stray_sum += *stray;
+    }
     let stray_share = (1.0 - sum / FIRM).max(0.0);
     let stray_share = stray_share * stray_share;
     let inside = if sum > 0.0 { (1.0 - stray_share) / sum } else { 0.0 };
@@ -84,5 +100,9 @@ pub fn blend(grid: &Grid, leaf: u32, receiver: &Receiver) -> Blend {
     for (weight, stray) in blend.weights.iter_mut().zip(strays) {
         *weight = *weight * inside + stray * outside;
     }
-    blend
+}
+
+fn probe_of<'a>(grid: &'a Grid, blend: &Blend, i: usize) -> Option<&'a Probe> {
+    let probe = *grid.leaf_probes.get(blend.first as usize + i)?;
+    grid.probes.get(probe as usize)
 }

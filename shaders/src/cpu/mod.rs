@@ -2,6 +2,7 @@
 
 pub mod upload;
 pub mod punctual;
+pub mod shadow;
 pub mod direct;
 pub mod inject;
 pub mod form_factor;

@@ -1,6 +1,6 @@
 //! The far light of each probe, from the frame's radiosities: to be done again only where lights changed.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use vlm_format::{Grid, Probe, Sample, Uncovered};
 
@@ -93,6 +93,43 @@ pub fn refresh(grid: &Grid, lights: &LightSet, sources: &[FarSource], radiosity:
     Arrived { far, near: near.collect(), free }
 }
 
+/// In place of a light's number after the last of a probe's near lights that shine.
+pub const NO_NEAR: f32 = -1.0;
+
+/// [`Arrived::near`] as the shaders store it: of each probe the near lights that shine, with their number in w, which a float holds exactly up
+/// to 2^24; then [`NO_NEAR`], if there is room left.
+#[must_use]
+pub fn near_entries(grid: &Grid, near: &[Vec3]) -> Vec<Vec4> {
+    let mut entries = vec![Vec4::new(0.0, 0.0, 0.0, NO_NEAR); near.len()];
+    for probe in 0..grid.probes.len() {
+        let mut place = grid.near_range(probe).start;
+        for number in grid.near_range(probe) {
+            let Some((&radiosity, &light)) = near.get(number).zip(grid.near.get(number)) else { continue };
+            if radiosity != Vec3::ZERO {
+                entries[place] = radiosity.extend(light as f32);
+                place += 1;
+            }
+        }
+    }
+    entries
+}
+
+/// The inverse of [`near_entries`].
+#[must_use]
+pub fn near_of_entries(grid: &Grid, entries: &[Vec4]) -> Vec<Vec3> {
+    let mut near = vec![Vec3::ZERO; entries.len()];
+    for probe in 0..grid.probes.len() {
+        let range = grid.near_range(probe);
+        for entry in entries.get(range.clone()).unwrap_or(&[]).iter().take_while(|entry| entry.w >= 0.0) {
+            let number = range.clone().find(|&number| grid.near[number] as f32 == entry.w);
+            if let Some(radiosity) = number.and_then(|number| near.get_mut(number)) {
+                *radiosity = entry.truncate();
+            }
+        }
+    }
+    near
+}
+
 fn near_radiosity(grid: &Grid, number: usize, row_scale: f32, lights: &LightSet, radiosity: &[Vec3]) -> Vec3 {
     let (light, form_factor) =
         (grid.near[number], grid.near_form_factors.get(number).copied().unwrap_or(1.0));
@@ -140,4 +177,24 @@ fn slope(probe: &Probe, source: &FarSource) -> Vec3 {
     let slope = r * (4.0 / squared) - source.normal / facing;
     let most = 1.0 / (probe.reach.iter().sum::<f32>() / 4.0);
     if slope.is_finite() { slope.clamp_length_max(most) } else { Vec3::ZERO }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn near_lights_that_shine_come_first() {
+        let grid = Grid {
+            probes: vec![Probe::default(); 2],
+            near_starts: vec![0, 3, 4],
+            near: vec![5, 7, 9, 8],
+            ..Grid::default()
+        };
+        let near = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+        let entries = near_entries(&grid, &near);
+        let lights: Vec<f32> = entries.iter().map(|entry| entry.w).collect();
+        assert_eq!(lights, [7.0, 9.0, NO_NEAR, 8.0]);
+        assert_eq!(near_of_entries(&grid, &entries), near);
+    }
 }

@@ -52,37 +52,60 @@ fn stray_weight(probe: Probe, local: vec3f, normal: vec3f) -> f32 {
     return (facing * facing + 1e-3) / (1e-2 + away * away);
 }
 
-fn normal_weight(probe: Probe, normal: vec3f) -> f32 {
-    let c = clamp((dot(normal, probe.normal) - LEAST_NORMAL_COSINE) / (1.0 - LEAST_NORMAL_COSINE), 0.0, 1.0);
+fn normal_weight(probe_normal: vec3f, normal: vec3f) -> f32 {
+    let c = clamp((dot(normal, probe_normal) - LEAST_NORMAL_COSINE) / (1.0 - LEAST_NORMAL_COSINE), 0.0, 1.0);
     return c * c;
 }
 
 fn blend(leaf: u32, position: vec3f, normal: vec3f) -> Blend {
     var blend = Blend();
+    weigh(&blend, leaf, position, normal);
+    return blend;
+}
+
+// In place, as shaders copy what functions return. Most of a leaf's probes face elsewhere, so that is asked first, and strays only where they
+// count.
+fn weigh(blend: ptr<function, Blend>, leaf: u32, position: vec3f, normal: vec3f) {
     if !is_leaf(leaf) {
-        return blend;
+        return;
     }
     let lists = leaf_of(leaf);
-    blend.first = lists.probes;
-    blend.count = min(lists.free_probes - lists.probes, MOST_PROBES);
-    var strays = array<f32, MOST_PROBES>();
+    let count = min(lists.free_probes - lists.probes, MOST_PROBES);
+    (*blend).first = lists.probes;
+    (*blend).count = count;
     var sum = 0.0;
-    var stray_sum = 0.0;
-    for (var i = 0u; i < blend.count; i++) {
-        let number = probe_of(blend.first, i);
-        if number >= arrayLength(&probes) {
-            continue;
-        }
-        let probe = probes[number];
-        let place = local(probe, position);
-        let weight = normal_weight(probe, normal) * place_weight(probe, place);
-        let stray = stray_weight(probe, place, normal);
-        blend.weights[i] = weight;
-        strays[i] = stray;
+    for (var i = 0u; i < count; i++) {
+        let weight = weight_of(probe_of(lists.probes, i), position, normal);
+        (*blend).weights[i] = weight;
         sum += weight;
-        stray_sum += stray;
     }
-    // Where reaches end, strays fade in.
+    if !(sum < FIRM) {
+        for (var i = 0u; i < count; i++) {
+            (*blend).weights[i] *= 1.0 / sum;
+        }
+        return;
+    }
+    add_strays(blend, sum, position, normal);
+}
+
+fn weight_of(number: u32, position: vec3f, normal: vec3f) -> f32 {
+    if number >= arrayLength(&probes) {
+        return 0.0;
+    }
+    let facing = normal_weight(probes[number].normal, normal);
+    if !(facing > 0.0) {
+        return 0.0;
+    }
+    let probe = probes[number];
+    return facing * place_weight(probe, local(probe, position));
+}
+
+// Where reaches end, strays fade in.
+fn add_strays(blend: ptr<function, Blend>, sum: f32, position: vec3f, normal: vec3f) {
+    var stray_sum = 0.0;
+    for (var i = 0u; i < (*blend).count; i++) {
+        stray_sum += stray_of(probe_of((*blend).first, i), position, normal);
+    }
     var stray_share = max(1.0 - sum / FIRM, 0.0);
     stray_share *= stray_share;
     var inside = 0.0;
@@ -95,10 +118,18 @@ fn blend(leaf: u32, position: vec3f, normal: vec3f) -> Blend {
     if stray_sum > 0.0 {
         outside = stray_share / stray_sum;
     }
-    for (var i = 0u; i < blend.count; i++) {
-        blend.weights[i] = blend.weights[i] * inside + strays[i] * outside;
+    for (var i = 0u; i < (*blend).count; i++) {
+        let stray = stray_of(probe_of((*blend).first, i), position, normal);
+        (*blend).weights[i] = (*blend).weights[i] * inside + stray * outside;
     }
-    return blend;
+}
+
+fn stray_of(number: u32, position: vec3f, normal: vec3f) -> f32 {
+    if number >= arrayLength(&probes) {
+        return 0.0;
+    }
+    let probe = probes[number];
+    return stray_weight(probe, local(probe, position), normal);
 }
 
 // The number of probe `i` of those of a leaf, which begin at `first`.

@@ -1,4 +1,8 @@
-// The far light of a probe. After shared/blend.wgsl; mirror: `FarLight` in src/cpu/refresh.rs.
+// The far light of a probe, and how its near lights are stored. After shared/blend.wgsl; mirrors: `FarLight` and `near_entries` in
+// src/cpu/refresh.rs.
+
+// In place of a light's number after the last of a probe's near lights that shine.
+const NO_NEAR: f32 = -1.0;
 
 struct FarLight {
     by_normal: array<array<f32, 3>, 3>,

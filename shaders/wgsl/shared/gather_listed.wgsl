@@ -6,23 +6,22 @@ const SUM_BLOCK: u32 = 64u;
 
 // Phase 1's result, lx; w is not used.
 @group(1) @binding(4) var<storage, read> light_radiosity: array<vec4f>;
-// How many lights, then their numbers.
-@group(1) @binding(5) var<storage, read> listed: array<u32>;
 
 fn gather_listed(position: vec3f, normal: vec3f, geometric_normal: vec3f, tag: u32) -> Gathered {
     var gathered = Gathered();
-    let count = min(listed[0], arrayLength(&listed) - 1u);
+    let has_own_horizon = any(geometric_normal != normal);
+    let count = min(indices[header.summed], header.light_count);
     for (var start = 0u; start < count; start += SUM_BLOCK) {
         var block = vec3f(0.0);
         for (var i = start; i < min(start + SUM_BLOCK, count); i++) {
-            let light = listed[i + 1u];
+            let light = indices[header.summed + 1u + i];
             let radiosity = light_radiosity[light].rgb;
             if all(radiosity == vec3f(0.0)) || is_of_tag(light, tag) {
                 continue;
             }
             gathered.pairs++;
             let geometry = lights[light];
-            if !is_behind(geometry, position, geometric_normal) {
+            if !(has_own_horizon && is_behind(geometry, position, geometric_normal)) {
                 block += radiosity * form_factor(geometry, position, normal);
             }
         }

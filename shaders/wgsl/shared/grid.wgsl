@@ -4,6 +4,8 @@
 
 const MOST_PROBES: u32 = 32u;
 const DEEPEST: u32 = 24u;
+// In place of a list's length: no list, but all that there are.
+const ALL: u32 = 0xffffffffu;
 // What `leaf_at` gives where there is no leaf.
 const NO_LEAF: u32 = 0xffffffffu;
 
@@ -25,6 +27,10 @@ struct GridHeader {
     sample_count: u32,
     uncovered_count: u32,
     light_tags: u32,
+    summed: u32,
+    injected: u32,
+    refreshed: u32,
+    padding: u32,
 }
 
 struct Leaf {
@@ -64,6 +70,18 @@ fn near_range(probe: u32) -> Range {
         return Range(0u, 0u);
     }
     return range;
+}
+
+// What an invocation works on: its number, or what stands there in the list at `start`, if that has so many.
+fn listed(start: u32, number: u32) -> u32 {
+    let count = indices[start];
+    if count == ALL {
+        return number;
+    }
+    if number >= count {
+        return ALL;
+    }
+    return indices[start + 1u + number];
 }
 
 fn sample_range(light: u32) -> Range {

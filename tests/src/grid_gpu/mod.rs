@@ -6,7 +6,7 @@ use vlm_format::{Grid, MOST_PROBES};
 use vlm_shaders::cpu::free_light::FreeLight;
 use vlm_shaders::cpu::gather::{Gathered, Receiver};
 use vlm_shaders::cpu::grid::Blend;
-use vlm_shaders::cpu::refresh::{Arrived, FarLight, far_sources};
+use vlm_shaders::cpu::refresh::{Arrived, FarLight, far_sources, near_entries, near_of_entries};
 use vlm_shaders::cpu::upload::LightSet;
 use vlm_shaders::tables::GridTables;
 use vlm_shaders::wgsl;
@@ -141,7 +141,7 @@ impl GridPasses {
         ];
         let groups = [self.common(&self.refresh, scene), gpu.group(&self.refresh, 1, &group)];
         self.dispatch(&self.refresh, &groups, grid.probes.len());
-        let (far, near) = (self.read(&far)?, self.read_vectors(&near)?);
+        let (far, near) = (self.read(&far)?, near_of_entries(grid, &self.read::<Vec4>(&near)?));
         Ok(Arrived { far, near, free: self.refresh_free(scene, radiosity)? })
     }
 
@@ -205,7 +205,7 @@ impl GridPasses {
         let (lights, far, near) = (
             gpu.input("lights", bytemuck::cast_slice(&scene.lights.geometry)),
             gpu.input("far", bytemuck::cast_slice(&arrived.far)),
-            self.vectors("near_radiosities", &arrived.near),
+            gpu.input("near_radiosities", bytemuck::cast_slice(&near_entries(scene.grid, &arrived.near))),
         );
         let mut group: Vec<(u32, &Buffer)> = (0..).zip([&scene.probes, &lights, &far, &near]).collect();
         group.extend_from_slice(more);

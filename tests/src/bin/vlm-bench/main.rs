@@ -7,6 +7,8 @@ mod grid;
 mod bake;
 mod breakdown;
 mod clearance;
+mod shadows;
+mod frame;
 mod output;
 
 use std::process::ExitCode;
@@ -40,6 +42,10 @@ enum Command {
     Breakdown(breakdown::BreakdownArgs),
     /// How well lights hide behind their surface, over files and budgets
     Clearance(clearance::ClearanceArgs),
+    /// How long the passes of a frame take, beside the bare form factor
+    Frame(frame::FrameArgs),
+    /// How far shadow maps lie from rays, by their size
+    Shadows(shadows::ShadowsArgs),
     /// Form factors of a file of cases, or the stress test
     FormFactor(command::FormFactorArgs),
     /// Measure the form factor's throughput on one core
@@ -56,6 +62,8 @@ fn main() -> ExitCode {
         Command::BakeChild(args) => bake::run_child(&args).map(|()| ExitCode::SUCCESS),
         Command::Breakdown(args) => breakdown::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Clearance(args) => clearance::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Frame(args) => frame::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Shadows(args) => shadows::run(&args).map(|()| ExitCode::SUCCESS),
         Command::FormFactor(args) => command::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Kernel(args) => kernel::run(&args).map(|()| ExitCode::SUCCESS),
     };
