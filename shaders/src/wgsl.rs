@@ -21,6 +21,12 @@ pub const LIGHTS: &str = include_str!("../wgsl/shared/lights.wgsl");
 /// The function `gather_static` with its bindings, for shaders that light pixels; after [`LIGHTS`], [`GRID`], [`BLEND`] and [`FAR`].
 pub const GATHER_STATIC: &str = include_str!("../wgsl/shared/gather_static.wgsl");
 
+/// From a pixel's depth to its place.
+pub const VIEW: &str = include_str!("../wgsl/shared/view.wgsl");
+
+/// Irradiance by real lights, shadows aside.
+pub const PUNCTUAL: &str = include_str!("../wgsl/shared/punctual.wgsl");
+
 /// The rows of probes; after [`GRID`].
 const ROWS: &str = include_str!("../wgsl/shared/rows.wgsl");
 
@@ -49,7 +55,7 @@ pub fn form_factor_sums() -> String {
 /// The direct light at the points that phase 1 lights; entry point `direct`, 64 invocations per workgroup, one per span of points.
 #[must_use]
 pub fn direct() -> String {
-    format!("{}\n{}", include_str!("../wgsl/shared/punctual.wgsl"), include_str!("../wgsl/direct.wgsl"))
+    format!("{PUNCTUAL}\n{}", include_str!("../wgsl/direct.wgsl"))
 }
 
 /// Phase 1: the radiosity of lights and sources; entry point `inject`, 64 invocations per workgroup, one per light and one per piece
@@ -154,10 +160,9 @@ impl Gathering {
         } else {
             include_str!("../wgsl/shared/no_count.wgsl")
         };
-        let view = include_str!("../wgsl/shared/view.wgsl");
         let gather = include_str!("../wgsl/gather_deferred.wgsl");
         let gather = if float { gather.replace("rgba16float", "rgba32float") } else { gather.to_owned() };
-        [&self.indirect(), view, tags, count, &gather].join("\n")
+        [&self.indirect(), VIEW, tags, count, &gather].join("\n")
     }
 
     fn name(self) -> &'static str {

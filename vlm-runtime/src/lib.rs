@@ -21,6 +21,9 @@ mod refresh;
 mod gather;
 mod renderer;
 
+#[cfg(feature = "view")]
+pub mod view;
+
 pub use device::{check_limits, request_device};
 pub use error::Error;
 pub use frame::{Frame, IrradianceFormat, MovedNode, Settings, Targets, Visibility};

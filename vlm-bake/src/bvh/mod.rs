@@ -65,7 +65,49 @@ pub struct Nearest {
     pub distance: f32,
 }
 
+/// A tree for other devices to walk: node 0 is the root, and nothing at all is an empty tree.
+#[derive(Clone, Debug, Default)]
+pub struct FlatBvh {
+    /// Inner nodes and leaves.
+    pub nodes: Vec<FlatNode>,
+    /// Corners of the triangles in the order in which leaves count them, metres.
+    pub corners: Vec<[Vec3; 3]>,
+    /// Most nodes on the way from the root to a leaf.
+    pub depth: usize,
+    /// As [`Bvh::leave_distance`].
+    pub leave_distance: f32,
+}
+
+/// A node of a [`FlatBvh`]. 32 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct FlatNode {
+    /// Least corner of the box around it, metres.
+    pub least: Vec3,
+    /// Triangles of a leaf; 0 for an inner node.
+    pub count: u32,
+    /// Largest corner.
+    pub most: Vec3,
+    /// The leaf's first triangle, or the first of two children.
+    pub first: u32,
+}
+
 impl Bvh {
+    /// The tree without what only this processor's queries need.
+    #[must_use]
+    pub fn flat(&self) -> FlatBvh {
+        let flat = |node: &Bvh2Node| {
+            let Aabb { min, max, .. } = *node.aabb();
+            FlatNode { least: min.into(), count: node.prim_count, most: max.into(), first: node.first_index }
+        };
+        FlatBvh {
+            nodes: self.tree.nodes.iter().map(flat).collect(),
+            corners: self.corners.iter().map(|corners| corners.map(Vec3::from)).collect(),
+            depth: self.tree.max_depth,
+            leave_distance: self.leave_distance,
+        }
+    }
+
     /// Builds the tree. Triangles with indices out of range or coordinates that are not finite are left out.
     #[must_use]
     pub fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
