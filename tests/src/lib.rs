@@ -12,6 +12,7 @@ pub mod form_factor;
 pub mod grid_gpu;
 pub mod active_hemisphere;
 pub mod runtime_gpu;
+pub mod viewing;
 pub mod thesis;
 pub mod plot;
 pub mod random;

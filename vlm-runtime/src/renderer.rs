@@ -48,7 +48,7 @@ struct Loaded {
     changes: Changes,
     /// Nodes that are not at rest.
     moved: Vec<MovedNode>,
-    /// Factors of the light of each VLM; 1 where there is none.
+    /// Factors of the lights; 1 where there is none.
     tints: Vec<Vec3>,
     /// The radiosity of lights is to be found anew.
     is_stale: bool,
@@ -134,15 +134,15 @@ impl VlmRenderer {
         Ok(&self.loaded()?.host.points)
     }
 
-    /// Multiplies the light of each VLM of the asset, in their order, from now on; 1 where there is no factor. As if the file had that much
-    /// more intensity or tint, but surface for which no light stands keeps its own.
+    /// Multiplies what each of the asset's lights reflects and emits, in their order, from now on; by 1 where there is no factor. Surface for
+    /// which no light stands keeps its own.
     ///
     /// # Errors
     /// [`Error::NotLoaded`]; [`Error::NotFinite`], and then nothing changes.
     pub fn set_tints(&mut self, queue: &Queue, tints: &[Vec3]) -> Result<(), Error> {
         let loaded = self.loaded.as_mut().ok_or(Error::NotLoaded)?;
         if let Some(number) = tints.iter().position(|tint| !tint.is_finite()) {
-            return Err(Error::NotFinite { what: format!("the tint of VLM {number}") });
+            return Err(Error::NotFinite { what: format!("the tint of virtual light {number}") });
         }
         loaded.stats.bytes_uploaded += loaded.tint(queue, tints);
         Ok(())
@@ -369,39 +369,29 @@ impl Loaded {
         Ok(bytes + self.write_listed(queue, &listed))
     }
 
-    /// Writes the reflectances and emissions of lights whose tint changed; bytes written.
+    /// Writes the reflectances and emissions of the lights from the first to the last whose tint changed; bytes written.
     fn tint(&mut self, queue: &Queue, tints: &[Vec3]) -> u64 {
-        let of = |tints: &[Vec3], vlm: usize| tints.get(vlm).copied().unwrap_or(Vec3::ONE);
-        let changed: Vec<(usize, Vec3)> = (0..self.asset.asset.vlms.len())
-            .map(|vlm| (vlm, of(tints, vlm)))
-            .filter(|&(vlm, tint)| of(&self.tints, vlm) != tint)
-            .collect();
-        self.tints = tints.to_vec();
-        if changed.is_empty() {
-            return 0;
-        }
-        self.is_stale = true;
-        let bytes: u64 = changed.into_iter().map(|(vlm, tint)| self.tint_vlm(queue, vlm, tint)).sum();
-        let listed = self.lights_of(&self.moved);
-        bytes
-            + write(queue, &self.uploaded.light_surfaces, 0, &self.host.light_surfaces)
-            + self.write_listed(queue, &listed)
-    }
-
-    fn tint_vlm(&mut self, queue: &Queue, vlm: usize, tint: Vec3) -> u64 {
-        let Some(vlm) = self.asset.asset.vlms.get(vlm) else { return 0 };
+        let of = |tints: &[Vec3], light: usize| tints.get(light).copied().unwrap_or(Vec3::ONE);
+        let changes = |light: &usize| of(tints, *light) != of(&self.tints, *light);
         let set = &self.asset.lights;
-        let [first, count] = vlm.lights.map(|number| number as usize);
-        let lights = first..first.saturating_add(count).min(set.len());
+        let (first, last) = ((0..set.len()).find(changes), (0..set.len()).rfind(changes));
+        self.tints = tints.to_vec();
+        let Some((first, last)) = first.zip(last) else { return 0 };
         let start = |light: usize| set.sample_starts.get(light).map_or(0, |&start| start as usize);
-        let mut samples = set.samples.get(start(lights.start)..start(lights.end)).unwrap_or(&[]).to_vec();
-        samples.iter_mut().for_each(|sample| sample.reflectance *= tint);
-        for light in lights.clone() {
+        let mut samples = set.samples.get(start(first)..start(last + 1)).unwrap_or(&[]).to_vec();
+        for light in first..=last {
+            let tint = of(tints, light);
+            let own = start(light) - start(first)..start(light + 1) - start(first);
+            samples.get_mut(own).unwrap_or_default().iter_mut().for_each(|s| s.reflectance *= tint);
             if let Some(surface) = self.host.light_surfaces.get_mut(light) {
                 surface.emission = set.emission.get(light).copied().unwrap_or_default() * tint;
             }
         }
-        write(queue, &self.uploaded.samples, start(lights.start), &samples)
+        self.is_stale = true;
+        let listed = self.lights_of(&self.moved);
+        write(queue, &self.uploaded.samples, start(first), &samples)
+            + write(queue, &self.uploaded.light_surfaces, 0, &self.host.light_surfaces)
+            + self.write_listed(queue, &listed)
     }
 
     fn rest(&self, node: u32) -> Option<DMat4> {

@@ -4,9 +4,9 @@ use glam::Vec3;
 use vlm_bake::render::Method;
 use vlm_bake::scene::Scene;
 use vlm_bake::shade::punctual_light;
-use vlm_format::Vlm;
 
 use super::arguments::OverlayArg;
+use super::open::LightGroup;
 use crate::PunctualLight;
 
 /// What the user chose.
@@ -26,8 +26,8 @@ pub struct Controls {
     pub difference_gain: f32,
     /// The real lights, in the order of the file.
     pub lights: Vec<LightControl>,
-    /// The virtual lights, node by node.
-    pub vlms: Vec<VlmControl>,
+    /// The virtual lights, group by group.
+    pub bounces: Vec<BounceControl>,
     /// What is drawn over the picture.
     pub overlays: Overlays,
     /// Alpha masks cut holes.
@@ -45,13 +45,11 @@ pub struct LightControl {
     pub intensity: f32,
 }
 
-/// The light that one node bounces.
+/// The light that one group of virtual lights sends on.
 #[derive(Clone, Debug, PartialEq)]
-pub struct VlmControl {
-    /// The VLM's id in the file.
-    pub id: String,
-    /// Its node, for the user to read.
-    pub name: String,
+pub struct BounceControl {
+    /// Which lights.
+    pub group: LightGroup,
     /// Factor of its light.
     pub intensity: f32,
     /// Factor of its light by channel, linear.
@@ -81,7 +79,7 @@ impl Default for Controls {
             indirect_share: 1.0,
             difference_gain: 1.0,
             lights: Vec::new(),
-            vlms: Vec::new(),
+            bounces: Vec::new(),
             overlays: Overlays::default(),
             alpha_masks: false,
         }
@@ -90,7 +88,7 @@ impl Default for Controls {
 
 impl Controls {
     /// Takes over a scene that was opened, or opened anew: what the user made of its lights stays, where they are still as they were.
-    pub fn adopt(&mut self, scene: &Scene, vlms: &[Vlm]) {
+    pub fn adopt(&mut self, scene: &Scene, groups: Vec<LightGroup>) {
         let lights = std::mem::take(&mut self.lights);
         let before = |i: usize, original: &PunctualLight| {
             lights.get(i).filter(|light| light.original == *original).cloned()
@@ -100,18 +98,13 @@ impl Controls {
             before(i, &original).unwrap_or(LightControl { original, light: original, intensity: 1.0 })
         });
         self.lights = adopted.collect();
-        let known = std::mem::take(&mut self.vlms);
-        let adopt = |vlm: &Vlm| {
-            let before = known.iter().find(|known| known.id == vlm.id).cloned();
-            let name = scene.objects.iter().find(|o| o.node == vlm.node).map(|o| o.path.clone());
-            before.unwrap_or_else(|| VlmControl {
-                id: vlm.id.clone(),
-                name: name.unwrap_or_else(|| vlm.id.clone()),
-                intensity: 1.0,
-                tint: Vec3::ONE,
-            })
+        let known = std::mem::take(&mut self.bounces);
+        let adopt = |group: LightGroup| {
+            let before = known.iter().find(|known| known.group.id == group.id);
+            let (intensity, tint) = before.map_or((1.0, Vec3::ONE), |before| (before.intensity, before.tint));
+            BounceControl { group, intensity, tint }
         };
-        self.vlms = vlms.iter().map(adopt).collect();
+        self.bounces = groups.into_iter().map(adopt).collect();
     }
 
     /// The real lights as they shine.
@@ -120,10 +113,20 @@ impl Controls {
         self.lights.iter().map(LightControl::shining).collect()
     }
 
-    /// The factor of the light of each VLM.
+    /// The factor of each virtual light; empty where all are 1.
     #[must_use]
     pub fn tints(&self) -> Vec<Vec3> {
-        self.vlms.iter().map(|vlm| vlm.tint * vlm.intensity).collect()
+        let mut tints = Vec::new();
+        for bounce in self.bounces.iter().filter(|bounce| !bounce.is_neutral()) {
+            for &light in &bounce.group.lights {
+                let light = light as usize;
+                if tints.len() <= light {
+                    tints.resize(light + 1, Vec3::ONE);
+                }
+                tints[light] = bounce.tint * bounce.intensity;
+            }
+        }
+        tints
     }
 
     /// The methods whose light is shown.
@@ -141,8 +144,8 @@ impl LightControl {
     }
 }
 
-impl VlmControl {
-    /// What the file would have to say for the same light, to be copied into the node's extras.
+impl BounceControl {
+    /// What the file would have to say for the same light, to be copied into the node's extras; for groups that are whole.
     #[must_use]
     pub fn as_extras(&self) -> String {
         let Vec3 { x, y, z } = self.tint;

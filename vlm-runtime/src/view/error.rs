@@ -35,6 +35,14 @@ pub enum ViewError {
         /// Why not.
         source: RenderError,
     },
+    /// An image that a file refers to cannot be read.
+    #[error("{file}: {reason}")]
+    Image {
+        /// Name of the file.
+        file: String,
+        /// Which images, and why.
+        reason: String,
+    },
     /// No such camera.
     #[error(transparent)]
     Camera(#[from] UnknownCamera),
@@ -92,14 +100,12 @@ impl ViewError {
                 | crate::Error::Limit { .. } => 2,
                 _ => 1,
             },
-            Self::Format(_) | Self::Scene(_) | Self::Bake { .. } | Self::Render { .. } => 1,
+            Self::Format(_)
+            | Self::Scene(_)
+            | Self::Image { .. }
+            | Self::Bake { .. }
+            | Self::Render { .. } => 1,
             _ => 2,
         }
-    }
-
-    /// The bake was cancelled since the file changed once more: not worth a word.
-    #[must_use]
-    pub fn is_cancelled(&self) -> bool {
-        matches!(self, Self::Bake { source: BakeError::Cancelled, .. })
     }
 }

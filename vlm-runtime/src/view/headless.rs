@@ -38,11 +38,22 @@ pub struct ViewReport {
     pub adapter: String,
 }
 
+/// A picture that was made.
+#[derive(Clone, Debug)]
+pub struct Headless {
+    /// What it took.
+    pub report: ViewReport,
+    /// The light that it is made of.
+    pub rendering: Rendering,
+    /// What radiance in nt was multiplied by, if it was written as a picture.
+    pub exposure: f32,
+}
+
 /// Makes the picture that the arguments ask for and writes its files.
 ///
 /// # Errors
 /// Whatever keeps it from being made or written.
-pub fn headless(arguments: &Arguments) -> Result<(ViewReport, Rendering), ViewError> {
+pub fn headless(arguments: &Arguments) -> Result<Headless, ViewError> {
     let method = Method::from(arguments.method);
     let options = OpenOptions { preset: arguments.preset.into(), needs_lights: method != Method::Direct };
     let opened = Opened::open(&arguments.file, options, &Silent)?;
@@ -79,8 +90,7 @@ pub fn headless(arguments: &Arguments) -> Result<(ViewReport, Rendering), ViewEr
         write_picture(path, arguments.size, &viewer.picture(&controls, &camera)?)?;
     }
     let report = report(&rendering, frame, (camera.name, method), viewer.gpu().name.clone());
-    print(arguments, &report, controls.exposure)?;
-    Ok((report, rendering))
+    Ok(Headless { report, rendering, exposure: controls.exposure })
 }
 
 fn report(
@@ -118,24 +128,31 @@ pub fn write_picture(path: &Path, (width, height): (u32, u32), pixels: &[[u8; 3]
     Ok(write_file(path, file.get_ref())?)
 }
 
-fn print(arguments: &Arguments, report: &ViewReport, exposure: f32) -> Result<(), ViewError> {
-    if arguments.json {
-        let json = serde_json::to_string_pretty(report);
-        return print_lines(&[json.map_err(|error| ViewError::Output(error.to_string()))?]);
+impl Headless {
+    /// Prints the report on stdout.
+    ///
+    /// # Errors
+    /// If stdout cannot be written.
+    pub fn print(&self, arguments: &Arguments) -> Result<(), ViewError> {
+        let Self { report, exposure, .. } = self;
+        if arguments.json {
+            let json = serde_json::to_string_pretty(report);
+            return print_lines(&[json.map_err(|error| ViewError::Output(error.to_string()))?]);
+        }
+        let ViewReport { render: RenderReport { camera, width, height, method, stats }, .. } = report;
+        let mut lines = vec![
+            format!("rendered  {width} x {height} by {method} from camera {camera} on {}", report.adapter),
+            format!("time      inject {:.3} s, gather {:.3} s", stats.seconds.inject, stats.seconds.gather),
+            format!("lights    {}, {} pairs evaluated", stats.lights, stats.pairs_evaluated),
+        ];
+        if let Some(path) = &arguments.out {
+            lines.push(format!("picture   {}  (radiance in nt times {exposure:.4})", path.display()));
+        }
+        if let Some(path) = &arguments.irradiance {
+            lines.push(format!("E1        {}", path.display()));
+        }
+        print_lines(&lines)
     }
-    let ViewReport { render: RenderReport { camera, width, height, method, stats }, .. } = report;
-    let mut lines = vec![
-        format!("rendered  {width} x {height} by {method} from camera {camera} on {}", report.adapter),
-        format!("time      inject {:.3} s, gather {:.3} s", stats.seconds.inject, stats.seconds.gather),
-        format!("lights    {}, {} pairs evaluated", stats.lights, stats.pairs_evaluated),
-    ];
-    if let Some(path) = &arguments.out {
-        lines.push(format!("picture   {}  (radiance in nt times {exposure:.4})", path.display()));
-    }
-    if let Some(path) = &arguments.irradiance {
-        lines.push(format!("E1        {}", path.display()));
-    }
-    print_lines(&lines)
 }
 
 /// A reader that closes the pipe early has seen what it wanted.

@@ -1,5 +1,6 @@
 //! open: a file as everything that the viewer puts on the device; baked first where it has no lights.
 
+use std::collections::BTreeMap;
 use std::io::{Read, stdin};
 use std::path::{Path, PathBuf};
 
@@ -24,6 +25,8 @@ pub struct Opened {
     pub asset: Option<VlmAsset>,
     /// The lights were made just now.
     pub is_baked: bool,
+    /// The lights by what a user would call them, each light in one group.
+    pub groups: Vec<LightGroup>,
     /// Tag of each of the scene's triangles, 0 for none.
     pub triangle_tags: Vec<u32>,
     /// The opaque triangles, for shadow rays on the device.
@@ -32,6 +35,19 @@ pub struct Opened {
     pub notes: Vec<String>,
     /// The file and those that it refers to.
     pub files: Vec<PathBuf>,
+}
+
+/// Lights of one node that stand for surface of one material: a wall, say.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightGroup {
+    /// Unique within the file, and the same when it is opened again.
+    pub id: String,
+    /// For the user to read.
+    pub name: String,
+    /// Numbers of the lights, ascending.
+    pub lights: Vec<u32>,
+    /// These are all lights of their node.
+    pub is_whole: bool,
 }
 
 /// What is asked of a file.
@@ -70,7 +86,17 @@ impl Opened {
         let triangle_tags = asset.as_ref().map_or_else(Vec::new, |asset| triangle_tags(&scene, asset.data()));
         let mut files = vec![path.to_owned()];
         files.extend(file.external_files());
-        Ok(Self { name, blockers: blockers(&scene), scene, asset, is_baked, triangle_tags, notes, files })
+        let (bvh, opaque) = opaque_triangles(&scene);
+        let groups = asset.as_ref().map_or_else(Vec::new, |asset| groups(&scene, asset, (&bvh, &opaque)));
+        let blockers = bvh.flat();
+        Ok(Self { name, scene, asset, is_baked, groups, triangle_tags, blockers, notes, files })
+    }
+
+    /// Images that could not be read and show as white: which, and why; empty if there are none.
+    #[must_use]
+    pub fn unreadable_images(&self) -> String {
+        let of_images = self.scene.notes.iter().filter(|note| note.starts_with("/images/"));
+        of_images.map(String::as_str).collect::<Vec<_>>().join("; ")
     }
 }
 
@@ -104,9 +130,42 @@ fn lights(
     Ok((VlmAsset::new(asset, file.world_from_nodes()), is_baked))
 }
 
-fn blockers(scene: &Scene) -> FlatBvh {
-    let is_opaque = |triangle: &usize| scene.material_of(*triangle).is_none_or(|material| material.reflects);
-    let opaque = (0..scene.triangles.len()).filter(is_opaque);
-    let triangles: Vec<[u32; 3]> = opaque.filter_map(|t| scene.triangles.get(t).copied()).collect();
-    Bvh::new(&scene.positions, &triangles).flat()
+/// The tree over the triangles that block light, and their numbers.
+fn opaque_triangles(scene: &Scene) -> (Bvh, Vec<u32>) {
+    let is_opaque =
+        |triangle: &u32| scene.material_of(*triangle as usize).is_none_or(|material| material.reflects);
+    let opaque: Vec<u32> = (0..scene.triangles.len() as u32).filter(is_opaque).collect();
+    let triangles: Vec<[u32; 3]> =
+        opaque.iter().filter_map(|t| scene.triangles.get(*t as usize).copied()).collect();
+    (Bvh::new(&scene.positions, &triangles), opaque)
+}
+
+fn groups(scene: &Scene, asset: &VlmAsset, surface: (&Bvh, &[u32])) -> Vec<LightGroup> {
+    let mut groups = Vec::new();
+    for vlm in &asset.data().vlms {
+        let object = scene.objects.iter().find(|object| object.node == vlm.node);
+        let node = object.map_or(&vlm.id, |object| &object.path);
+        let mut of_node: BTreeMap<&str, Vec<u32>> = BTreeMap::new();
+        for light in vlm.lights[0]..vlm.lights[0].saturating_add(vlm.lights[1]) {
+            let material = if vlm.authored { "authored" } else { material_of(scene, asset, light, surface) };
+            of_node.entry(material).or_default().push(light);
+        }
+        let is_whole = of_node.len() == 1;
+        groups.extend(of_node.into_iter().map(|(material, lights)| LightGroup {
+            id: format!("{} {material}", vlm.id),
+            name: format!("{node}: {material}"),
+            lights,
+            is_whole,
+        }));
+    }
+    groups
+}
+
+/// The material of the surface on which a light's first sample lies.
+fn material_of<'a>(scene: &'a Scene, asset: &VlmAsset, light: u32, (bvh, opaque): (&Bvh, &[u32])) -> &'a str {
+    let sample = asset.lights().samples_of(light as usize).first();
+    let nearest = sample.and_then(|sample| bvh.closest(sample.position, f32::INFINITY, |_| true));
+    let triangle = nearest.and_then(|nearest| opaque.get(nearest.triangle as usize));
+    let material = triangle.and_then(|triangle| scene.material_of(*triangle as usize));
+    material.map_or("no surface", |material| material.name.as_str())
 }

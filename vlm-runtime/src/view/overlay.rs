@@ -75,7 +75,7 @@ struct Pipelines {
 }
 
 /// What an asset's overlays read.
-struct Loaded {
+pub(crate) struct Loaded {
     grid: BindGroup,
     /// Near lights of each leaf.
     counts: Buffer,
@@ -113,10 +113,14 @@ impl OverlayStage {
         Ok(())
     }
 
-    /// Takes over the lights of an asset.
-    pub(crate) fn load(&mut self, gpu: &Gpu, asset: Option<&VlmAsset>) -> Result<(), ViewError> {
-        self.loaded = asset.map(|asset| Loaded::new(gpu, &self.grid_layout, asset)).transpose()?;
-        Ok(())
+    /// What the overlays of an asset read, for [`OverlayStage::take`].
+    pub(crate) fn load(&self, gpu: &Gpu, asset: Option<&VlmAsset>) -> Result<Option<Loaded>, ViewError> {
+        asset.map(|asset| Loaded::new(gpu, &self.grid_layout, asset)).transpose()
+    }
+
+    /// Shows another asset from now on.
+    pub(crate) fn take(&mut self, loaded: Option<Loaded>) {
+        self.loaded = loaded;
     }
 
     /// Adds what the controls ask for. `radiosity` is that of the lights, where it is asked for.

@@ -148,10 +148,10 @@ impl Viewer {
         for method in controls.methods() {
             shown.by(&self.gpu, method, self.options)?;
         }
-        self.overlay.load(&self.gpu, shown.asset.as_ref())?;
+        let overlays = self.overlay.load(&self.gpu, shown.asset.as_ref())?;
         self.gpu.check()?;
-        let vlms = shown.asset.as_ref().map_or(&[][..], |asset| &asset.data().vlms);
-        controls.adopt(&shown.scene, vlms);
+        self.overlay.take(overlays);
+        controls.adopt(&shown.scene, opened.groups);
         self.shown = Some(shown);
         self.generation += 1;
         Ok(())
