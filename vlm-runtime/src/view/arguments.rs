@@ -18,9 +18,9 @@ pub struct Arguments {
     /// Camera of the file, by name or number from 0 [default: the first; one chosen to show the scene if there is none]
     #[arg(long, value_name = "NAME|INDEX")]
     pub camera: Option<String>,
-    /// Size of the picture in pixels
-    #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size)]
-    pub size: (u32, u32),
+    /// Size of the picture in pixels [default: 640x480, in a window 1024x768]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<(u32, u32)>,
     /// Where the indirect light comes from
     #[arg(long, value_enum, default_value = "vlm")]
     pub method: MethodArg,

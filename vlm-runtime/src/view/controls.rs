@@ -9,6 +9,9 @@ use super::arguments::OverlayArg;
 use super::open::LightGroup;
 use crate::PunctualLight;
 
+/// Darker channels are not brightened beyond what this would need.
+const LEAST_ALBEDO: f32 = 0.01;
+
 /// What the user chose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Controls {
@@ -150,6 +153,17 @@ impl BounceControl {
     pub fn as_extras(&self) -> String {
         let Vec3 { x, y, z } = self.tint;
         format!(r#""vlm": {{ "intensity": {:.3}, "tint": [{x:.3}, {y:.3}, {z:.3}] }}"#, self.intensity)
+    }
+
+    /// The colour that the surface seems to have, from the light that it sends on; linear, 0 to 1.
+    #[must_use]
+    pub fn color(&self) -> Vec3 {
+        (self.group.albedo * self.tint).clamp(Vec3::ZERO, Vec3::ONE)
+    }
+
+    /// Makes the light as if the surface had this colour. A channel that it does not reflect stays weak.
+    pub fn set_color(&mut self, color: Vec3) {
+        self.tint = color / self.group.albedo.max(Vec3::splat(LEAST_ALBEDO));
     }
 
     /// The file's own light.

@@ -20,6 +20,9 @@ use super::shaders::Sources;
 use super::viewer::{FrameReport, PICTURE_FORMAT, Viewer, ViewerOptions};
 use crate::stats::Skipped;
 
+/// As `vlm render` has it, pixels.
+const DEFAULT_SIZE: (u32, u32) = (640, 480);
+
 /// What a picture took, as `--json` prints it.
 #[derive(Clone, Debug, Serialize)]
 pub struct ViewReport {
@@ -73,11 +76,12 @@ pub fn headless(arguments: &Arguments) -> Result<Headless, ViewError> {
         ..Controls::default()
     };
     viewer.show(opened, &mut controls)?;
+    let size = arguments.size.unwrap_or(DEFAULT_SIZE);
     for _ in 0..arguments.reloads {
         viewer.show(Opened::open(&arguments.file, options, &Silent)?, &mut controls)?;
-        viewer.frame(&controls, &camera, arguments.size.into(), true)?;
+        viewer.frame(&controls, &camera, size.into(), true)?;
     }
-    let frame = viewer.frame(&controls, &camera, arguments.size.into(), true)?;
+    let frame = viewer.frame(&controls, &camera, size.into(), true)?;
     let rendering = viewer.rendering(&frame)?;
     if let Some(path) = &arguments.irradiance {
         write_irradiance(&rendering, path)?;
@@ -87,7 +91,7 @@ pub fn headless(arguments: &Arguments) -> Result<Headless, ViewError> {
             Some(exposure) => exposure,
             None => viewer.auto_exposure()?,
         };
-        write_picture(path, arguments.size, &viewer.picture(&controls, &camera)?)?;
+        write_picture(path, size, &viewer.picture(&controls, &camera)?)?;
     }
     let report = report(&rendering, frame, (camera.name, method), viewer.gpu().name.clone());
     Ok(Headless { report, rendering, exposure: controls.exposure })

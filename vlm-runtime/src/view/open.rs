@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{Read, stdin};
 use std::path::{Path, PathBuf};
 
+use glam::Vec3;
 use vlm_bake::bake::bake;
 use vlm_bake::bvh::{Bvh, FlatBvh};
 use vlm_bake::options::{BakeOptions, Preset};
@@ -46,6 +47,8 @@ pub struct LightGroup {
     pub name: String,
     /// Numbers of the lights, ascending.
     pub lights: Vec<u32>,
+    /// Their mean albedo, linear; white for lights that only emit.
+    pub albedo: Vec3,
     /// These are all lights of their node.
     pub is_whole: bool,
 }
@@ -154,11 +157,18 @@ fn groups(scene: &Scene, asset: &VlmAsset, surface: (&Bvh, &[u32])) -> Vec<Light
         groups.extend(of_node.into_iter().map(|(material, lights)| LightGroup {
             id: format!("{} {material}", vlm.id),
             name: format!("{node}: {material}"),
+            albedo: mean_albedo(asset, &lights),
             lights,
             is_whole,
         }));
     }
     groups
+}
+
+fn mean_albedo(asset: &VlmAsset, lights: &[u32]) -> Vec3 {
+    let albedos = lights.iter().filter_map(|light| asset.data().albedo.get(*light as usize));
+    let sum: Vec3 = albedos.sum();
+    if sum == Vec3::ZERO { Vec3::ONE } else { sum / lights.len() as f32 }
 }
 
 /// The material of the surface on which a light's first sample lies.

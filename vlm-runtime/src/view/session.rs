@@ -7,6 +7,7 @@ use vlm_bake::scene::Camera;
 use super::controls::Controls;
 use super::error::ViewError;
 use super::eye::Flight;
+use super::resolve::Screen;
 use super::times::PassTimes;
 use super::viewer::{FrameReport, Viewer};
 use super::watch::{News, Watcher};
@@ -33,6 +34,8 @@ pub struct Session {
     watcher: Watcher,
     /// Why the file is not shown as it is now.
     error: Option<String>,
+    /// Why there is no frame.
+    frame_error: Option<String>,
     /// Why a shader is not used as it is now.
     shader_error: Option<String>,
     notes: Vec<String>,
@@ -40,7 +43,8 @@ pub struct Session {
     is_baked: bool,
     opened: u64,
     report: FrameReport,
-    times: PassTimes,
+    times: Option<PassTimes>,
+    has_worked: bool,
 }
 
 impl Session {
@@ -54,13 +58,15 @@ impl Session {
             wants_exposure: false,
             watcher,
             error: None,
+            frame_error: None,
             shader_error: None,
             notes: Vec::new(),
             name: String::new(),
             is_baked: false,
             opened: 0,
             report: FrameReport::default(),
-            times: PassTimes::new(),
+            times: None,
+            has_worked: false,
         }
     }
 
@@ -120,18 +126,23 @@ impl Session {
     /// there is a frame.
     pub fn frame(&mut self, size: [u32; 2], must_wait: bool) -> bool {
         let Some(camera) = self.camera() else { return false };
-        match self.try_frame(&camera, size, must_wait) {
-            Ok(()) => true,
-            Err(error) => {
-                self.error = Some(error.to_string());
-                false
-            }
-        }
+        let made = self.try_frame(&camera, size, must_wait);
+        self.frame_error = made.err().map(|error| error.to_string());
+        self.frame_error.is_none()
+    }
+
+    /// Shows the last frame; true if it could.
+    pub fn present(&mut self, screen: Screen<'_>) -> bool {
+        let Some(camera) = self.camera() else { return false };
+        let shown = self.viewer.present(&self.controls, &camera, screen);
+        self.frame_error = shown.err().map(|error| error.to_string());
+        self.frame_error.is_none()
     }
 
     fn try_frame(&mut self, camera: &Camera, size: [u32; 2], must_wait: bool) -> Result<(), ViewError> {
         let report = self.viewer.frame(&self.controls, camera, size, must_wait)?;
-        if !report.stats.passes.is_empty() {
+        self.has_worked = !report.stats.passes.is_empty();
+        if self.has_worked {
             self.report = report;
         } else {
             self.report.is_pending = report.is_pending;
@@ -139,15 +150,13 @@ impl Session {
         if std::mem::take(&mut self.wants_exposure) {
             self.controls.exposure = self.viewer.auto_exposure()?;
         }
-        if let Some(times) = self.viewer.pass_times() {
-            self.times = times;
-        }
+        self.times = self.viewer.pass_times().or(self.times.take());
         Ok(())
     }
 
     /// Why the file, or a shader, is not shown as it is now.
     pub fn errors(&self) -> impl Iterator<Item = &str> {
-        [&self.error, &self.shader_error].into_iter().flatten().map(String::as_str)
+        [&self.error, &self.frame_error, &self.shader_error].into_iter().flatten().map(String::as_str)
     }
 
     /// What the user should know of the file that is shown.
@@ -186,9 +195,14 @@ impl Session {
         &self.report
     }
 
-    /// Milliseconds of the passes of a recent frame; empty where the device does not tell.
+    /// The last frame had anything to do.
     #[must_use]
-    pub fn times(&self) -> &PassTimes {
-        &self.times
+    pub fn has_worked(&self) -> bool {
+        self.has_worked
+    }
+
+    /// Milliseconds of the passes of a recent frame, once each; `None` where the device does not tell.
+    pub fn take_times(&mut self) -> Option<PassTimes> {
+        self.times.take()
     }
 }

@@ -114,9 +114,9 @@ fn bounces(ui: &mut Ui, bounces: &mut [BounceControl]) {
     for (number, bounce) in bounces.iter_mut().enumerate() {
         ui.push_id(number, |ui| {
             ui.horizontal(|ui| {
-                let mut tint = bounce.tint.to_array();
-                if ui.color_edit_button_rgb(&mut tint).changed() {
-                    bounce.tint = Vec3::from_array(tint);
+                let mut color = bounce.color().to_array();
+                if ui.color_edit_button_rgb(&mut color).changed() {
+                    bounce.set_color(Vec3::from_array(color));
                 }
                 ui.add(DragValue::new(&mut bounce.intensity).range(0.0..=1000.0).speed(0.02).prefix("x "));
                 if !bounce.is_neutral() && ui.small_button("reset").clicked() {

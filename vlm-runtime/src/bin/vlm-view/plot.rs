@@ -28,7 +28,7 @@ pub struct Plot {
 
 impl Plot {
     /// Adds a frame: all of it by the clock, then its passes.
-    pub fn add(&mut self, frame: f32, passes: &PassTimes) {
+    pub fn add(&mut self, frame: f32, passes: &[(&'static str, f32)]) {
         let mut times = vec![("frame", frame)];
         times.extend(passes);
         self.frames.push_back(times);

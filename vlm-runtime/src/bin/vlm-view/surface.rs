@@ -69,6 +69,21 @@ impl WindowSurface {
         }
     }
 
+    /// Takes over the panel's textures; those to be freed once it is painted. To be called even where it is not.
+    pub fn take_textures(&mut self, output: &mut egui::FullOutput) -> Vec<egui::TextureId> {
+        let Gpu { device, queue, .. } = &self.gpu;
+        let textures = std::mem::take(&mut output.textures_delta.set);
+        for (id, deltas) in &textures {
+            deltas.iter().for_each(|delta| self.painter.update_texture(device, queue, *id, delta));
+        }
+        std::mem::take(&mut output.textures_delta.free).into_iter().collect()
+    }
+
+    /// Frees textures of the panel.
+    pub fn free_textures(&mut self, textures: &[egui::TextureId]) {
+        textures.iter().for_each(|id| self.painter.free_texture(id));
+    }
+
     /// Paints the panel over the picture; `clears` where there is none.
     pub fn paint(
         &mut self,
@@ -77,9 +92,6 @@ impl WindowSurface {
         clears: bool,
     ) {
         let Gpu { device, queue, .. } = &self.gpu;
-        for (id, deltas) in &output.textures_delta.set {
-            deltas.iter().for_each(|delta| self.painter.update_texture(device, queue, *id, delta));
-        }
         let pixels_per_point = output.pixels_per_point;
         let screen = ScreenDescriptor { size_in_pixels: self.size(), pixels_per_point };
         let triangles = context.tessellate(output.shapes, pixels_per_point);
@@ -98,8 +110,5 @@ impl WindowSurface {
         });
         self.painter.render(&mut pass.forget_lifetime(), &triangles, &screen);
         queue.submit(own.into_iter().chain([encoder.finish()]));
-        for id in &output.textures_delta.free {
-            self.painter.free_texture(id);
-        }
     }
 }

@@ -20,6 +20,9 @@ use crate::panel::panel;
 use crate::plot::Plot;
 use crate::surface::WindowSurface;
 
+/// Of the picture, points.
+const DEFAULT_SIZE: (u32, u32) = (1024, 768);
+
 /// Points; the picture of `--size` stands beside it.
 const PANEL_WIDTH: f32 = 320.0;
 
@@ -47,6 +50,8 @@ struct Open {
     session: Session,
     input: egui_winit::State,
     plot: Plot,
+    /// Of the last frame that had anything to do.
+    milliseconds: f32,
     flying: Flying,
 }
 
@@ -102,7 +107,7 @@ impl Open {
         proxy: EventLoopProxy<()>,
         event_loop: &ActiveEventLoop,
     ) -> Result<Self, ViewError> {
-        let (width, height) = arguments.size;
+        let (width, height) = arguments.size.unwrap_or(DEFAULT_SIZE);
         let title = format!("{} - vlm-view", arguments.file.display());
         let size = LogicalSize::new(f64::from(width) + f64::from(PANEL_WIDTH), f64::from(height));
         let attributes = Window::default_attributes().with_title(title).with_inner_size(size);
@@ -116,7 +121,8 @@ impl Open {
         let viewport = egui::ViewportId::ROOT;
         let input = egui_winit::State::new(context, viewport, event_loop, None, None, Some(side));
         window.request_redraw();
-        Ok(Self { window, surface, session, input, plot: Plot::default(), flying: Flying::new() })
+        let (plot, flying) = (Plot::default(), Flying::new());
+        Ok(Self { window, surface, session, input, plot, milliseconds: 0.0, flying })
     }
 
     /// Draws a frame; when the next one is due, if at all.
@@ -141,20 +147,37 @@ impl Open {
         self.input.handle_platform_output(&self.window, std::mem::take(&mut output.platform_output));
         let repaint = output.viewport_output.values().map(|viewport| viewport.repaint_delay).min();
 
-        let Some(texture) = self.surface.next() else { return Some(Duration::from_millis(50)) };
+        let freed = self.surface.take_textures(&mut output);
+        let Some(texture) = self.surface.next() else {
+            self.surface.free_textures(&freed);
+            return Some(Duration::from_millis(50));
+        };
         let view = texture.texture.create_view(&wgpu::TextureViewDescriptor::default());
         let has_picture = self.show_picture(&view, picture, output.pixels_per_point);
         self.surface.paint(&view, (&context, output), !has_picture);
+        self.surface.free_textures(&freed);
         self.window.pre_present_notify();
         self.surface.gpu.queue.present(texture);
-        let frame = start.elapsed().as_secs_f32() * 1e3;
-        self.plot.add(frame, self.session.times());
+        self.time(start);
 
         let is_busy = is_moving || self.session.report().is_pending;
         let soon = if is_busy { Some(Duration::ZERO) } else { None };
         let while_opening = self.session.activity().map(|_| Duration::from_millis(100));
         let repaint = repaint.filter(|delay| *delay < Duration::from_secs(3600));
         [soon, repaint, while_opening].into_iter().flatten().min()
+    }
+
+    /// Adds frames that had anything to do to the plot, with the times of their passes where the device tells them.
+    fn time(&mut self, start: Instant) {
+        if self.session.has_worked() {
+            self.milliseconds = start.elapsed().as_secs_f32() * 1e3;
+            if !self.surface.gpu.has_timestamps {
+                self.plot.add(self.milliseconds, &[]);
+            }
+        }
+        if let Some(times) = self.session.take_times() {
+            self.plot.add(self.milliseconds, &times);
+        }
     }
 
     /// Shows the picture beside the panel; true if there is one.
@@ -167,8 +190,7 @@ impl Open {
         if size.contains(&0) || !self.session.frame(size, false) {
             return false;
         }
-        let Some(camera) = self.session.camera() else { return false };
-        self.session.viewer.present(&self.session.controls, &camera, Screen { view, origin }).is_ok()
+        self.session.present(Screen { view, origin })
     }
 }
 

@@ -24,6 +24,7 @@ struct Corner {
     @location(0) color: vec3f,
     // Metres along the view.
     @location(1) distance: f32,
+    // Cosine between the light's normal and the way to the eye.
     @location(2) facing: f32,
 }
 
@@ -32,7 +33,7 @@ fn vertex(@location(0) position: vec3f, @location(1) normal: vec3f, @location(2)
     let away = position - settings.eye;
     let sight = select(settings.forward, away, settings.is_perspective != 0u);
     let clip = settings.clip_from_world * vec4f(position, 1.0);
-    return Corner(clip, color, dot(away, settings.forward), -dot(sight, normal));
+    return Corner(clip, color, dot(away, settings.forward), -dot(sight, normal) / length(sight));
 }
 
 @fragment
@@ -41,7 +42,8 @@ fn fragment(corner: Corner) -> @location(0) vec4f {
     let perspective = settings.depth_scale / max(depth, 1e-20);
     let shown = select((1.0 - depth) * settings.depth_scale, perspective, settings.is_perspective != 0u);
     let behind = corner.distance - shown;
-    if corner.facing <= 0.0 || behind > settings.reach {
+    // Seen at a slant, a light lies farther behind.
+    if corner.facing <= 0.0 || behind * max(corner.facing, 0.02) > settings.reach {
         discard;
     }
     return vec4f(corner.color, settings.opacity);
