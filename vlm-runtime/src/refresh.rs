@@ -4,7 +4,7 @@ use vlm_shaders::wgsl;
 use wgpu::{BindGroup, BindGroupLayout, CommandEncoder, ComputePipeline, Device};
 
 use crate::error::Error;
-use crate::pass::{self, dispatch, group, layout, storage, workgroups};
+use crate::pass::{Compiled, dispatch, group, layout, storage, workgroups};
 use crate::upload::{GridBuffers, Uploaded};
 
 /// The pass for an asset.
@@ -16,7 +16,7 @@ pub(crate) struct Refresh {
 
 impl Refresh {
     pub(crate) fn new(
-        device: &Device,
+        (device, compiled): (&Device, &mut Compiled),
         common: &BindGroupLayout,
         uploaded: &Uploaded,
         grid: &GridBuffers,
@@ -35,7 +35,7 @@ impl Refresh {
         ];
         Ok(Self {
             group: group(device, "refresh", &layout, &bound),
-            pipeline: pass::pipeline(device, "refresh", &wgsl::refresh(), &[common, &layout]),
+            pipeline: compiled.pipeline(device, "refresh", &wgsl::refresh(), &[common, &layout]),
             workgroups: workgroups(device, "refresh", probes)?,
         })
     }

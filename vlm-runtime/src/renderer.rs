@@ -17,7 +17,7 @@ use crate::frame::{Frame, MovedNode, Settings, Targets, Visibility};
 use crate::gather::Gather;
 use crate::inject::{Inject, InjectPipeline};
 use crate::load::{VlmAsset, world_lights};
-use crate::pass::{Buffers, group, layout, storage, uniform};
+use crate::pass::{Buffers, Compiled, group, layout, storage, uniform};
 use crate::refresh::Refresh;
 use crate::stats::FrameStats;
 use crate::upload::{Host, Uploaded, check_listed, check_real_lights, list_words};
@@ -32,6 +32,8 @@ pub struct VlmRenderer {
     common: BindGroupLayout,
     direct: DirectPipeline,
     inject: InjectPipeline,
+    /// Those that only some assets need.
+    compiled: Compiled,
     loaded: Option<Loaded>,
 }
 
@@ -70,6 +72,7 @@ impl VlmRenderer {
             device: device.clone(),
             settings,
             common,
+            compiled: Compiled::default(),
             loaded: None,
         })
     }
@@ -91,14 +94,21 @@ impl VlmRenderer {
         let elements = asset.lights.len() + pieces.len();
         let gathering = self.gathering(asset, grid);
         let refresh = uploaded.grid.as_ref().zip(grid).map(|(buffers, grid)| {
-            Refresh::new(&self.device, &self.common, &uploaded, buffers, grid.probes.len())
+            let on = (&self.device, &mut self.compiled);
+            Refresh::new(on, &self.common, &uploaded, buffers, grid.probes.len())
         });
         let mut loaded = Loaded {
             common: group(&self.device, "common", &self.common, &header),
             direct: Direct::new(&self.direct, buffers, &uploaded, points, spans)?,
             inject: Inject::new(&self.device, &self.inject, &uploaded, elements)?,
             refresh: refresh.transpose()?,
-            gather: Gather::new(buffers, &self.common, &uploaded, gathering, &self.settings)?,
+            gather: Gather::new(
+                (buffers, &mut self.compiled),
+                &self.common,
+                &uploaded,
+                gathering,
+                &self.settings,
+            )?,
             asset: asset.clone(),
             host,
             uploaded,
@@ -118,6 +128,11 @@ impl VlmRenderer {
         };
         self.loaded = Some(loaded);
         Ok(())
+    }
+
+    /// Frees the asset. What was compiled for it stays, and serves the next one.
+    pub fn unload(&mut self) {
+        self.loaded = None;
     }
 
     fn gathering(&self, asset: &VlmAsset, grid: Option<&Grid>) -> Gathering {

@@ -21,27 +21,22 @@ pub(crate) struct Indirect {
 }
 
 impl Indirect {
+    /// Loads the asset into a renderer of [`renderer`].
     pub(crate) fn new(
-        gpu: &Gpu,
-        (method, asset): (Method, &VlmAsset),
+        mut renderer: VlmRenderer,
+        asset: &VlmAsset,
         (shadows, rays): (ShadowsArg, &Rays),
         counts_pairs: bool,
     ) -> Result<Self, ViewError> {
-        let normal = Settings::default();
-        let settings = Settings {
-            fewest_lights_for_grid: if method == Method::Brute {
-                u32::MAX
-            } else {
-                normal.fewest_lights_for_grid
-            },
-            count_pairs: counts_pairs,
-            format: IrradianceFormat::Float,
-            ..normal
-        };
-        let mut renderer = VlmRenderer::new(&gpu.device, settings)?;
         renderer.load(asset)?;
         let shadows = Shadows::new(shadows, rays, renderer.points()?)?;
         Ok(Self { renderer, shadows, counts_pairs })
+    }
+
+    /// The renderer, without an asset, for the next one.
+    pub(crate) fn into_renderer(mut self) -> VlmRenderer {
+        self.renderer.unload();
+        self.renderer
     }
 
     /// Says what the next frame shows. Shadows that are still being traced come in a later frame, unless it `must_wait`.
@@ -100,4 +95,17 @@ impl Indirect {
     pub(crate) fn is_pending(&self) -> bool {
         self.shadows.is_pending()
     }
+}
+
+/// A renderer that gathers by a method.
+pub(crate) fn renderer(gpu: &Gpu, method: Method, counts_pairs: bool) -> Result<VlmRenderer, ViewError> {
+    let normal = Settings::default();
+    let fewest = if method == Method::Brute { u32::MAX } else { normal.fewest_lights_for_grid };
+    let settings = Settings {
+        fewest_lights_for_grid: fewest,
+        count_pairs: counts_pairs,
+        format: IrradianceFormat::Float,
+        ..normal
+    };
+    Ok(VlmRenderer::new(&gpu.device, settings)?)
 }

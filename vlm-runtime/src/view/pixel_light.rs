@@ -3,7 +3,7 @@
 use vlm_shaders::cpu::direct::PackedLight;
 use wgpu::{BindGroupLayout, Buffer, BufferUsages, CommandEncoder, ComputePipeline, ShaderStages};
 
-use super::bindings::{READ, TEXELS, UNIFORM, WRITE, filled, group, layout, pipeline_layout, view, zeros};
+use super::bindings::{READ, TEXELS, WRITE, filled, group, layout, pipeline_layout, view, zeros};
 use super::error::ViewError;
 use super::eye::Eye;
 use super::gpu::Gpu;
@@ -39,7 +39,7 @@ pub(crate) struct PixelLightStage {
 
 impl PixelLightStage {
     pub(crate) fn new(gpu: &Gpu, sources: &Sources) -> Result<Self, ViewError> {
-        let bindings = [UNIFORM, READ, READ, READ, TEXELS, TEXELS, TEXELS, WRITE];
+        let bindings = [READ, READ, READ, READ, TEXELS, TEXELS, TEXELS, WRITE];
         let layout = layout(gpu, "pixel light", ShaderStages::COMPUTE, &bindings);
         let size = u64::from(MOST_REAL_LIGHTS) * size_of::<PackedLight>() as u64;
         let lights = zeros(gpu, "lights", size, BufferUsages::STORAGE | BufferUsages::COPY_DST)?;
@@ -74,7 +74,7 @@ impl PixelLightStage {
                 leave_distance: scene.leave_distance,
                 node_count: scene.node_count,
             };
-            let settings = filled(gpu, "pixel light", &[settings], BufferUsages::UNIFORM)?;
+            let settings = filled(gpu, "pixel light", &[settings], BufferUsages::STORAGE)?;
             let resources = vec![
                 settings.as_entire_binding(),
                 self.lights.as_entire_binding(),

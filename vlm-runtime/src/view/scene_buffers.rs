@@ -51,7 +51,7 @@ pub(crate) struct SceneBuffers {
 impl SceneBuffers {
     pub(crate) fn new(gpu: &Gpu, stage: &SurfaceStage, opened: &Opened) -> Result<Self, ViewError> {
         let Opened { scene, triangle_tags, blockers, .. } = opened;
-        let FlatBvh { nodes, corners, leave_distance, .. } = blockers;
+        let FlatBvh { nodes, corners, leave_distance } = blockers;
         let tag = |triangle: usize| triangle_tags.get(triangle).copied().unwrap_or(0);
         let triangles: Vec<[u32; 4]> =
             scene.triangles.iter().enumerate().map(|(i, &[a, b, c])| [a, b, c, tag(i)]).collect();
@@ -62,7 +62,7 @@ impl SceneBuffers {
             materials: material_groups(gpu, stage, scene)?,
             draws: draws(scene),
             nodes: filled(gpu, "nodes", nodes, BufferUsages::STORAGE)?,
-            node_count: if corners.is_empty() { 0 } else { nodes.len() as u32 },
+            node_count: nodes.len() as u32,
             corners: filled(gpu, "corners", &corners, BufferUsages::STORAGE)?,
             leave_distance: *leave_distance,
             bounds: bounds(&scene.positions),

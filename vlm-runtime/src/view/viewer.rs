@@ -16,7 +16,7 @@ use super::controls::Controls;
 use super::error::ViewError;
 use super::eye::Eye;
 use super::gpu::Gpu;
-use super::indirect::Indirect;
+use super::indirect::{Indirect, renderer};
 use super::open::Opened;
 use super::overlay::OverlayStage;
 use super::pixel_light::PixelLightStage;
@@ -28,7 +28,7 @@ use super::shadows::Rays;
 use super::surface::SurfaceStage;
 use super::targets::{FrameTargets, Plane};
 use super::times::{PassTimes, Stopwatch};
-use crate::{FrameStats, PunctualLight, VlmAsset};
+use crate::{FrameStats, PunctualLight, VlmAsset, VlmRenderer};
 
 /// The format of pictures without a window.
 pub const PICTURE_FORMAT: TextureFormat = TextureFormat::Rgba8Unorm;
@@ -56,6 +56,8 @@ pub struct Viewer {
     stopwatch: Stopwatch,
     targets: Option<FrameTargets>,
     shown: Option<Shown>,
+    /// Renderers for the next scene; see [`Shown::spare`].
+    spare: [Option<VlmRenderer>; 2],
     /// What the targets hold.
     done: Option<Wanted>,
     generation: u64,
@@ -69,6 +71,8 @@ struct Shown {
     rays: Rays,
     /// By `vlm` and by `brute`, once they are asked for.
     indirect: [Option<Indirect>; 2],
+    /// Renderers of the scene before, by the same methods: what they compiled need not be compiled again.
+    spare: [Option<VlmRenderer>; 2],
 }
 
 /// What a frame was made from: what did not change is not made again.
@@ -113,6 +117,7 @@ impl Viewer {
             sources,
             targets: None,
             shown: None,
+            spare: [None, None],
             done: None,
             generation: 0,
         })
@@ -144,7 +149,8 @@ impl Viewer {
         let buffers = SceneBuffers::new(&self.gpu, &self.surface, &opened)?;
         let scene = Arc::new(opened.scene);
         let rays = Rays::new(scene.clone(), controls.alpha_masks);
-        let mut shown = Shown { scene, asset: opened.asset, buffers, rays, indirect: [None, None] };
+        let spare = std::mem::take(&mut self.spare);
+        let mut shown = Shown { scene, asset: opened.asset, buffers, rays, indirect: [None, None], spare };
         for method in controls.methods() {
             shown.by(&self.gpu, method, self.options)?;
         }
@@ -152,7 +158,11 @@ impl Viewer {
         self.gpu.check()?;
         self.overlay.take(overlays);
         controls.adopt(&shown.scene, opened.groups);
-        self.shown = Some(shown);
+        let before = self.shown.replace(shown);
+        self.spare = before.map_or([None, None], |before| {
+            let [vlm, brute] = before.indirect;
+            [vlm, brute].map(|indirect| indirect.map(Indirect::into_renderer))
+        });
         self.generation += 1;
         Ok(())
     }
@@ -371,8 +381,12 @@ impl Shown {
             let source = RenderError::NoLights;
             let none = || ViewError::Render { file: "the scene".to_owned(), source };
             let asset = self.asset.as_ref().ok_or_else(none)?;
+            let renderer = match self.spare[place].take() {
+                Some(spare) => spare,
+                None => renderer(gpu, method, options.measures)?,
+            };
             let shadows = (options.shadows, &self.rays);
-            *slot = Some(Indirect::new(gpu, (method, asset), shadows, options.measures)?);
+            *slot = Some(Indirect::new(renderer, asset, shadows, options.measures)?);
         }
         Ok(slot.as_mut())
     }

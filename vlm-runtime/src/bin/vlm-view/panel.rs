@@ -115,7 +115,10 @@ fn bounces(ui: &mut Ui, bounces: &mut [BounceControl]) {
         ui.push_id(number, |ui| {
             ui.horizontal(|ui| {
                 let mut color = bounce.color().to_array();
-                if ui.color_edit_button_rgb(&mut color).changed() {
+                // The picker rounds, which is no choice of the user's.
+                if ui.color_edit_button_rgb(&mut color).changed()
+                    && bounce.color().distance(Vec3::from_array(color)) > 1e-3
+                {
                     bounce.set_color(Vec3::from_array(color));
                 }
                 ui.add(DragValue::new(&mut bounce.intensity).range(0.0..=1000.0).speed(0.02).prefix("x "));

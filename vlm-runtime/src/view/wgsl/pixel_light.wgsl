@@ -1,4 +1,5 @@
-// Direct light of every pixel, by rays to the lights through a tree over the opaque triangles. After shared/view.wgsl and
+// Direct light of every pixel, by rays to the lights through a tree over the opaque triangles (`FlatBvh`). No stack: private
+// arrays are slow on many devices. After shared/view.wgsl and
 // shared/punctual.wgsl.
 
 struct Settings {
@@ -16,11 +17,12 @@ struct Node {
     // Triangles of a leaf; 0 for an inner node.
     count: u32,
     most: vec3f,
-    // The first triangle, or the first of two children.
+    // A leaf's first triangle; for an inner node the number of the node after all that is in it.
     first: u32,
 }
 
-@group(0) @binding(0) var<uniform> settings: Settings;
+// No uniform buffer: software devices compile loops anew for every value that they find in one.
+@group(0) @binding(0) var<storage, read> settings: Settings;
 @group(0) @binding(1) var<storage, read> real_lights: array<PunctualLight>;
 @group(0) @binding(2) var<storage, read> nodes: array<Node>;
 // Three corners per triangle.
@@ -30,8 +32,6 @@ struct Node {
 @group(0) @binding(6) var geometric_normals: texture_2d<f32>;
 // lx, row by row.
 @group(0) @binding(7) var<storage, read_write> irradiance: array<vec4f>;
-
-const STACK: u32 = 64u;
 
 @compute @workgroup_size(8, 8)
 fn pixel_light(@builtin(global_invocation_id) id: vec3u) {
@@ -77,27 +77,16 @@ fn arriving(light: PunctualLight, place: vec3f, normal: vec3f, geometric_normal:
 }
 
 fn is_occluded(origin: vec3f, way: vec3f, most: f32) -> bool {
-    if settings.node_count == 0u {
-        return false;
-    }
     // A component of 0 would make 0 times infinity.
     let safe = select(way, vec3f(1e-30), abs(way) < vec3f(1e-30));
     let inverse = 1.0 / safe;
-    var stack: array<u32, 64>;
-    var depth = 1u;
-    stack[0] = 0u;
-    while depth > 0u {
-        depth--;
-        let node = nodes[stack[depth]];
+    var at = 0u;
+    while at < settings.node_count {
+        let node = nodes[at];
+        at++;
         if !is_met(node, origin, inverse, most) {
-            continue;
-        }
-        if node.count == 0u {
-            if depth + 2u <= STACK {
-                stack[depth] = node.first;
-                stack[depth + 1u] = node.first + 1u;
-                depth += 2u;
-            }
+            // What follows an inner node's contents; a leaf has none.
+            at = select(at, node.first, node.count == 0u);
             continue;
         }
         for (var i = 0u; i < node.count; i++) {
