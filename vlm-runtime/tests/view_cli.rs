@@ -1,5 +1,7 @@
 //! The program `vlm-view`: what it prints, and with which code it ends. None of these needs a GPU.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::process::{Command, Output};
 
 fn run(arguments: &[&str]) -> Output {

@@ -14,11 +14,11 @@ use crate::error::within;
 /// As `Material` in the shader. 48 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Packed {
-    base_color: Vec4,
-    emission: Vec4,
-    is_masked: u32,
-    padding: [u32; 3],
+pub(super) struct Packed {
+    pub(super) base_color: Vec4,
+    pub(super) emission: Vec4,
+    pub(super) is_masked: u32,
+    pub(super) padding: [u32; 3],
 }
 
 /// A texture on the device, and how it is sampled.

@@ -24,10 +24,14 @@ mod overlay;
 mod readback;
 mod times;
 mod controls;
+mod shown;
 mod viewer;
 mod watch;
 mod session;
 mod headless;
+
+#[cfg(test)]
+mod shader_tests;
 
 pub use arguments::{Arguments, MethodArg, OverlayArg, PresetArg, ShadowsArg};
 pub use controls::{BounceControl, Controls, LightControl, Overlays};

@@ -28,25 +28,25 @@ use crate::{View, VlmAsset};
 /// As `Settings` in overlay_lights.wgsl. 112 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct LightSettings {
-    clip_from_world: Mat4,
-    eye: Vec3,
-    opacity: f32,
-    forward: Vec3,
-    is_perspective: u32,
-    origin: Vec2,
-    depth_scale: f32,
-    reach: f32,
+pub(super) struct LightSettings {
+    pub(super) clip_from_world: Mat4,
+    pub(super) eye: Vec3,
+    pub(super) opacity: f32,
+    pub(super) forward: Vec3,
+    pub(super) is_perspective: u32,
+    pub(super) origin: Vec2,
+    pub(super) depth_scale: f32,
+    pub(super) reach: f32,
 }
 
 /// As `Settings` in overlay_surface.wgsl. 96 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct SurfaceSettings {
-    view: View,
-    origin: Vec2,
-    shows_cells: u32,
-    most: f32,
+pub(super) struct SurfaceSettings {
+    pub(super) view: View,
+    pub(super) origin: Vec2,
+    pub(super) shows_cells: u32,
+    pub(super) most: f32,
 }
 
 /// A corner of a line or of a filled light. 36 bytes.

@@ -22,12 +22,12 @@ const TILE: u32 = 8;
 /// As `Settings` in the shader. 96 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Packed {
-    view: View,
-    first_light: u32,
-    end_light: u32,
-    leave_distance: f32,
-    node_count: u32,
+pub(super) struct Packed {
+    pub(super) view: View,
+    pub(super) first_light: u32,
+    pub(super) end_light: u32,
+    pub(super) leave_distance: f32,
+    pub(super) node_count: u32,
 }
 
 /// The pass over all pixels.

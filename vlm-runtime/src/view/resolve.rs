@@ -17,13 +17,13 @@ use super::targets::FrameTargets;
 /// As `Settings` in the shader. 32 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Packed {
-    origin: Vec2,
-    exposure: f32,
-    shows_difference: u32,
-    shares: Vec2,
-    gain: f32,
-    padding: f32,
+pub(super) struct Packed {
+    pub(super) origin: Vec2,
+    pub(super) exposure: f32,
+    pub(super) shows_difference: u32,
+    pub(super) shares: Vec2,
+    pub(super) gain: f32,
+    pub(super) padding: f32,
 }
 
 /// Where the picture is shown: a texture, and the pixel of it where the picture begins.

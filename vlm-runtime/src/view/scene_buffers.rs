@@ -17,11 +17,11 @@ use super::surface::SurfaceStage;
 /// As `Vertex` in the shader. 64 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Vertex {
-    position_u: Vec4,
-    normal_v: Vec4,
-    color_u: Vec4,
-    v: Vec4,
+pub(super) struct Vertex {
+    pub(super) position_u: Vec4,
+    pub(super) normal_v: Vec4,
+    pub(super) color_u: Vec4,
+    pub(super) v: Vec4,
 }
 
 /// Triangles that are drawn at once.

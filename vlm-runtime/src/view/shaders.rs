@@ -10,7 +10,7 @@ use super::error::ViewError;
 use super::gpu::Gpu;
 
 /// Each file with its text when the program was built.
-const FILES: [(&str, &str); 5] = [
+pub(super) const FILES: [(&str, &str); 5] = [
     ("surface.wgsl", include_str!("wgsl/surface.wgsl")),
     ("pixel_light.wgsl", include_str!("wgsl/pixel_light.wgsl")),
     ("resolve.wgsl", include_str!("wgsl/resolve.wgsl")),
@@ -86,8 +86,8 @@ fn reason(error: &wgpu::Error) -> String {
     lines.join("\n")
 }
 
-/// What [`pixel_light`](../wgsl) needs before it.
+/// What pixel_light.wgsl needs.
 pub(crate) const PIXEL_LIGHT_SHARED: [&str; 2] = [wgsl::VIEW, wgsl::PUNCTUAL];
 
-/// What the overlay over the surface needs.
+/// What overlay_surface.wgsl needs.
 pub(crate) const OVERLAY_SHARED: [&str; 2] = [wgsl::GRID, wgsl::VIEW];

@@ -18,12 +18,12 @@ use super::targets::{ALBEDO, DEPTH, FLOATS, FrameTargets, TAG};
 /// As `Camera` in the shader. 96 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Packed {
-    clip_from_world: Mat4,
-    eye: Vec3,
-    cuts_holes: u32,
-    forward: Vec3,
-    is_perspective: u32,
+pub(super) struct Packed {
+    pub(super) clip_from_world: Mat4,
+    pub(super) eye: Vec3,
+    pub(super) cuts_holes: u32,
+    pub(super) forward: Vec3,
+    pub(super) is_perspective: u32,
 }
 
 /// The passes that draw the visible surface.

@@ -1,22 +1,21 @@
 //! viewer: a scene on the device, and its frames, stage by stage.
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use glam::Vec3;
 use vlm_bake::gbuffer::GBuffer;
-use vlm_bake::render::{Method, PhaseSeconds, RenderError, RenderStats, Rendering};
+use vlm_bake::render::{PhaseSeconds, RenderStats, Rendering};
 use vlm_bake::scene::{Camera, Scene};
 use vlm_bake::shade::SurfacePoint;
 use vlm_shaders::cpu::resolve::auto_exposure;
-use wgpu::{CommandEncoder, TextureFormat, TextureUsages};
+use wgpu::{TextureFormat, TextureUsages};
 
 use super::arguments::ShadowsArg;
 use super::controls::Controls;
 use super::error::ViewError;
 use super::eye::Eye;
 use super::gpu::Gpu;
-use super::indirect::{Indirect, renderer};
+use super::indirect::Indirect;
 use super::open::Opened;
 use super::overlay::OverlayStage;
 use super::pixel_light::PixelLightStage;
@@ -25,10 +24,11 @@ use super::resolve::{ResolveStage, Screen};
 use super::scene_buffers::SceneBuffers;
 use super::shaders::Sources;
 use super::shadows::Rays;
+use super::shown::{Shown, Wanted, submit};
 use super::surface::SurfaceStage;
 use super::targets::{FrameTargets, Plane};
 use super::times::{PassTimes, Stopwatch};
-use crate::{FrameStats, PunctualLight, VlmAsset, VlmRenderer};
+use crate::{FrameStats, VlmAsset, VlmRenderer};
 
 /// The format of pictures without a window.
 pub const PICTURE_FORMAT: TextureFormat = TextureFormat::Rgba8Unorm;
@@ -61,30 +61,6 @@ pub struct Viewer {
     /// What the targets hold.
     done: Option<Wanted>,
     generation: u64,
-}
-
-/// A scene on the device.
-struct Shown {
-    scene: Arc<Scene>,
-    asset: Option<VlmAsset>,
-    buffers: SceneBuffers,
-    rays: Rays,
-    /// By `vlm` and by `brute`, once they are asked for.
-    indirect: [Option<Indirect>; 2],
-    /// Renderers of the scene before, by the same methods: what they compiled need not be compiled again.
-    spare: [Option<VlmRenderer>; 2],
-}
-
-/// What a frame was made from: what did not change is not made again.
-#[derive(Clone, PartialEq)]
-struct Wanted {
-    generation: u64,
-    camera: Camera,
-    size: [u32; 2],
-    alpha_masks: bool,
-    lights: Vec<PunctualLight>,
-    tints: Vec<Vec3>,
-    methods: Vec<Method>,
 }
 
 /// What a frame took.
@@ -197,9 +173,7 @@ impl Viewer {
             self.targets = Some(FrameTargets::new(&self.gpu, size)?);
             self.done = None;
         }
-        let (Some(shown), Some(targets)) = (&mut self.shown, &self.targets) else {
-            return Err(crate::Error::NotLoaded.into());
-        };
+        let Some(shown) = &self.shown else { return Err(crate::Error::NotLoaded.into()) };
         let wanted = Wanted {
             generation: self.generation,
             camera: camera.clone(),
@@ -216,22 +190,12 @@ impl Viewer {
             return Ok(FrameReport::default());
         }
         let eye = Eye::new(camera, size, shown.buffers.bounds);
+        self.stopwatch.begin();
+        self.draw_surface(&wanted, &eye, before)?;
+        let (Some(shown), Some(targets)) = (&mut self.shown, &self.targets) else {
+            return Err(crate::Error::NotLoaded.into());
+        };
         let (gpu, watch) = (&self.gpu, &mut self.stopwatch);
-        watch.begin();
-        submit(gpu, |encoder| {
-            let is_same_surface = before.as_ref().is_some_and(|before| before.same_surface(&wanted));
-            if !is_same_surface {
-                watch.lap(encoder, "surface");
-                let masks = (&eye, controls.alpha_masks);
-                self.surface.record(gpu, encoder, &shown.buffers, targets, masks);
-            }
-            if !is_same_surface || before.is_none_or(|before| before.lights != wanted.lights) {
-                watch.lap(encoder, "pixel light");
-                let on = (&shown.buffers, targets);
-                self.pixel_light.record(gpu, encoder, on, (&eye, &wanted.lights))?;
-            }
-            Ok(())
-        })?;
         let mut report = FrameReport::default();
         for plane in (0..wanted.methods.len()).rev() {
             let on = (gpu, self.options, &mut *watch);
@@ -245,6 +209,26 @@ impl Viewer {
         report.is_pending = shown.indirect.iter().flatten().any(Indirect::is_pending);
         self.done = Some(wanted);
         Ok(report)
+    }
+
+    /// The visible surface and the real lights on it, as far as they are not what the targets hold.
+    fn draw_surface(&mut self, wanted: &Wanted, eye: &Eye, before: Option<Wanted>) -> Result<(), ViewError> {
+        let (Some(shown), Some(targets)) = (&self.shown, &self.targets) else { return Ok(()) };
+        let (gpu, watch) = (&self.gpu, &mut self.stopwatch);
+        let is_same_surface = before.as_ref().is_some_and(|before| before.same_surface(wanted));
+        submit(gpu, |encoder| {
+            if !is_same_surface {
+                watch.lap(encoder, "surface");
+                let masks = (eye, wanted.alpha_masks);
+                self.surface.record(gpu, encoder, &shown.buffers, targets, masks);
+            }
+            if !is_same_surface || before.is_none_or(|before| before.lights != wanted.lights) {
+                watch.lap(encoder, "pixel light");
+                let on = (&shown.buffers, targets);
+                self.pixel_light.record(gpu, encoder, on, (eye, &wanted.lights))?;
+            }
+            Ok(())
+        })
     }
 
     /// Shows the last frame, with overlays.
@@ -332,75 +316,6 @@ impl Viewer {
     }
 }
 
-impl Shown {
-    /// Makes the light of one of the methods.
-    fn light(
-        &mut self,
-        (gpu, options, watch): (&Gpu, ViewerOptions, &mut Stopwatch),
-        (targets, plane): (&FrameTargets, usize),
-        (wanted, eye): (&Wanted, &Eye),
-        must_wait: bool,
-    ) -> Result<FrameReport, ViewError> {
-        let Some(&method) = wanted.methods.get(plane) else { return Ok(FrameReport::default()) };
-        let Some(indirect) = self.by(gpu, method, options)? else {
-            clear(gpu, targets, plane);
-            return Ok(FrameReport::default());
-        };
-        let start = Instant::now();
-        indirect.prepare(gpu, (&wanted.lights, &wanted.tints), eye.view(), must_wait)?;
-        let mut stats = submit(gpu, |encoder| {
-            watch.lap(encoder, "inject");
-            indirect.record_light(encoder)
-        })?;
-        let inject = seconds(gpu, options, start)?;
-        let start = Instant::now();
-        submit(gpu, |encoder| {
-            watch.lap(encoder, "gather");
-            indirect.record_gather(encoder, targets, plane, &mut stats)
-        })?;
-        let gather = seconds(gpu, options, start)?;
-        let pairs_evaluated = indirect.pairs(gpu)?;
-        let seconds = PhaseSeconds { inject, gather };
-        Ok(FrameReport { stats, seconds, pairs_evaluated, is_pending: indirect.is_pending() })
-    }
-
-    /// The lights by a method; `None` for direct light alone.
-    fn by(
-        &mut self,
-        gpu: &Gpu,
-        method: Method,
-        options: ViewerOptions,
-    ) -> Result<Option<&mut Indirect>, ViewError> {
-        let place = match method {
-            Method::Vlm => 0,
-            Method::Brute => 1,
-            Method::Direct | Method::Reference => return Ok(None),
-        };
-        let slot = &mut self.indirect[place];
-        if slot.is_none() {
-            let source = RenderError::NoLights;
-            let none = || ViewError::Render { file: "the scene".to_owned(), source };
-            let asset = self.asset.as_ref().ok_or_else(none)?;
-            let renderer = match self.spare[place].take() {
-                Some(spare) => spare,
-                None => renderer(gpu, method, options.measures)?,
-            };
-            let shadows = (options.shadows, &self.rays);
-            *slot = Some(Indirect::new(renderer, asset, shadows, options.measures)?);
-        }
-        Ok(slot.as_mut())
-    }
-}
-
-impl Wanted {
-    fn same_surface(&self, other: &Self) -> bool {
-        self.generation == other.generation
-            && self.camera == other.camera
-            && self.size == other.size
-            && self.alpha_masks == other.alpha_masks
-    }
-}
-
 const NOWHERE: SurfacePoint = SurfacePoint {
     triangle: 0,
     position: Vec3::ZERO,
@@ -409,32 +324,3 @@ const NOWHERE: SurfacePoint = SurfacePoint {
     albedo: Vec3::ZERO,
     emission: Vec3::ZERO,
 };
-
-fn submit<T>(
-    gpu: &Gpu,
-    record: impl FnOnce(&mut CommandEncoder) -> Result<T, ViewError>,
-) -> Result<T, ViewError> {
-    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    let recorded = record(&mut encoder)?;
-    gpu.queue.submit([encoder.finish()]);
-    Ok(recorded)
-}
-
-/// Since `start`, with all that was submitted done; 0 where nothing is measured.
-fn seconds(gpu: &Gpu, options: ViewerOptions, start: Instant) -> Result<f64, ViewError> {
-    if !options.measures {
-        return Ok(0.0);
-    }
-    gpu.wait()?;
-    Ok(start.elapsed().as_secs_f64())
-}
-
-/// No indirect light.
-fn clear(gpu: &Gpu, targets: &FrameTargets, plane: usize) {
-    let [width, height] = targets.size;
-    let zeros = vec![0_u8; width as usize * height as usize * size_of::<[f32; 4]>()];
-    let texture = &targets.indirect[plane.min(1)].texture;
-    let rows =
-        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(16 * width), rows_per_image: None };
-    gpu.queue.write_texture(texture.as_image_copy(), &zeros, rows, texture.size());
-}
