@@ -13,7 +13,7 @@ use tempfile::TempDir;
 use vlm_bake::follow::FollowOptions;
 use vlm_bake::options::Preset;
 use vlm_runtime::view::{
-    Controls, Gpu, OpenOptions, PICTURE_FORMAT, Session, ShadowsArg, Sources, Viewer, ViewerOptions,
+    Controls, Gpu, Look, OpenOptions, PICTURE_FORMAT, Session, ShadowsArg, Sources, Viewer, ViewerOptions,
     WatchOptions, Watcher,
 };
 use vlm_tests::glb::{Glb, Mesh};
@@ -220,6 +220,7 @@ fn choices_stay_over_a_reload() {
     let mut session = session(&file, Sources::default());
     until_opened(&mut session, 1);
     assert!(!session.is_baked());
+    assert_eq!(session.camera().unwrap().name, "camera");
     session.controls.exposure = 0.02;
     session.controls.lights[0].intensity = 0.5;
     let wall = session.controls.bounces.iter_mut().find(|bounce| bounce.group.name == "room: red").unwrap();
@@ -233,6 +234,16 @@ fn choices_stay_over_a_reload() {
     until_opened(&mut session, 2);
     assert_eq!(session.controls, chosen);
     assert_eq!(picture(&mut session), shown);
+}
+
+#[test]
+#[cfg_attr(not(has_vulkan), ignore = "no Vulkan driver")]
+fn a_camera_that_there_is_not_leaves_the_first_and_a_word() {
+    let folder = Folder::new();
+    let mut session = session(&folder.path("scene.gltf"), Sources::default());
+    session.look = Look::Camera(Some("roof".to_owned()));
+    until_error(&mut session, "`roof`");
+    assert!(session.frame(SIZE, true) && session.camera().unwrap().name == "eye");
 }
 
 #[test]

@@ -47,6 +47,13 @@ fn a_file_that_cannot_be_read_is_named() {
 }
 
 #[test]
+fn a_pipe_is_not_followed() {
+    let output = run(&["-"]);
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    assert!(stderr(&output).contains("--headless"), "{}", stderr(&output));
+}
+
+#[test]
 fn flags_that_do_not_go_together_are_refused() {
     for flags in [&["--out", "a.png"][..], &["--json"], &["--headless", "--size", "0x8"], &["--method", "x"]]
     {

@@ -103,12 +103,19 @@ impl Session {
                     Err(error) => self.error = Some(error.to_string()),
                     Ok(()) => {
                         (self.name, self.notes, self.is_baked) = (name, notes, is_baked);
-                        self.error = None;
+                        self.error = self.missing_camera();
                         self.opened += 1;
                     }
                 }
             }
         }
+    }
+
+    /// Why the first camera is shown and not the one that was asked for, where that is so.
+    fn missing_camera(&self) -> Option<String> {
+        let Look::Camera(wanted) = &self.look else { return None };
+        let found = self.viewer.scene()?.camera(wanted.as_deref());
+        found.err().map(|error| error.to_string())
     }
 
     /// The camera that the user looks through; `None` as long as there is no scene.
@@ -141,7 +148,7 @@ impl Session {
 
     fn try_frame(&mut self, camera: &Camera, size: [u32; 2], must_wait: bool) -> Result<(), ViewError> {
         let report = self.viewer.frame(&self.controls, camera, size, must_wait)?;
-        self.has_worked = !report.stats.passes.is_empty();
+        self.has_worked = report.is_new;
         if self.has_worked {
             self.report = report;
         } else {

@@ -8,6 +8,7 @@ use vlm_bake::render::{Method, PhaseSeconds, RenderError};
 use vlm_bake::scene::{Camera, Scene};
 use wgpu::CommandEncoder;
 
+use super::bindings::attachment;
 use super::error::ViewError;
 use super::eye::Eye;
 use super::gpu::Gpu;
@@ -54,8 +55,8 @@ impl Shown {
     ) -> Result<FrameReport, ViewError> {
         let Some(&method) = wanted.methods.get(plane) else { return Ok(FrameReport::default()) };
         let Some(indirect) = self.by(gpu, method, options)? else {
-            clear(gpu, targets, plane);
-            return Ok(FrameReport::default());
+            clear(gpu, targets, plane)?;
+            return Ok(FrameReport { is_new: true, ..FrameReport::default() });
         };
         let start = Instant::now();
         indirect.prepare(gpu, (&wanted.lights, &wanted.tints), eye.view(), must_wait)?;
@@ -72,7 +73,8 @@ impl Shown {
         let gather = seconds(gpu, options, start)?;
         let pairs_evaluated = indirect.pairs(gpu)?;
         let seconds = PhaseSeconds { inject, gather };
-        Ok(FrameReport { stats, seconds, pairs_evaluated, is_pending: indirect.is_pending() })
+        let is_pending = indirect.is_pending();
+        Ok(FrameReport { stats, seconds, pairs_evaluated, is_pending, is_new: true })
     }
 
     /// The lights by a method; `None` for direct light alone.
@@ -134,11 +136,14 @@ fn seconds(gpu: &Gpu, options: ViewerOptions, start: Instant) -> Result<f64, Vie
 }
 
 /// No indirect light.
-fn clear(gpu: &Gpu, targets: &FrameTargets, plane: usize) {
-    let [width, height] = targets.size;
-    let zeros = vec![0_u8; width as usize * height as usize * size_of::<[f32; 4]>()];
-    let texture = &targets.indirect[plane.min(1)].texture;
-    let rows =
-        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(16 * width), rows_per_image: None };
-    gpu.queue.write_texture(texture.as_image_copy(), &zeros, rows, texture.size());
+fn clear(gpu: &Gpu, targets: &FrameTargets, plane: usize) -> Result<(), ViewError> {
+    submit(gpu, |encoder| {
+        let plane = &targets.indirect[plane.min(1)].view;
+        drop(encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("no indirect light"),
+            color_attachments: &[attachment(plane, Some(wgpu::Color::TRANSPARENT))],
+            ..wgpu::RenderPassDescriptor::default()
+        }));
+        Ok(())
+    })
 }

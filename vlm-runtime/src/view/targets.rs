@@ -44,8 +44,7 @@ impl FrameTargets {
         within("the picture (pixels of a side)", "max_texture_dimension_2d", longest, limit)?;
         let drawn = TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING;
         let read = drawn | TextureUsages::COPY_SRC;
-        let copied = TextureUsages::COPY_SRC | TextureUsages::COPY_DST;
-        let lit = TextureUsages::STORAGE_BINDING | TextureUsages::TEXTURE_BINDING | copied;
+        let lit = read | TextureUsages::STORAGE_BINDING;
         let plane = |label, format, usage| Plane::new(gpu, label, size, format, usage);
         let bytes = u64::from(size[0]) * u64::from(size[1]) * size_of::<[f32; 4]>() as u64;
         let light = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;

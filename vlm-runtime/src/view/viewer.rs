@@ -74,6 +74,8 @@ pub struct FrameReport {
     pub pairs_evaluated: u64,
     /// Better shadows are on their way: ask for another frame.
     pub is_pending: bool,
+    /// Something had changed since the last frame.
+    pub is_new: bool,
 }
 
 impl Viewer {

@@ -28,6 +28,11 @@ const PANEL_WIDTH: f32 = 320.0;
 
 /// Runs the window until it is closed.
 pub fn run(arguments: Arguments) -> Result<(), ViewError> {
+    if arguments.file.as_os_str() == "-" {
+        return Err(ViewError::Usage(
+            "standard input cannot be followed: name a file, or use `--headless`".to_owned(),
+        ));
+    }
     let failed = |error: winit::error::EventLoopError| ViewError::Window(error.to_string());
     let event_loop = EventLoop::with_user_event().build().map_err(failed)?;
     let mut app = App { arguments, proxy: event_loop.create_proxy(), open: None, failure: None };
