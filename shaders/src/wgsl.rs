@@ -21,6 +21,12 @@ pub const LIGHTS: &str = include_str!("../wgsl/shared/lights.wgsl");
 /// The function `gather_static` with its bindings, for shaders that light pixels; after [`LIGHTS`], [`GRID`], [`BLEND`] and [`FAR`].
 pub const GATHER_STATIC: &str = include_str!("../wgsl/shared/gather_static.wgsl");
 
+/// From a pixel's depth to its place.
+pub const VIEW: &str = include_str!("../wgsl/shared/view.wgsl");
+
+/// Irradiance by real lights, shadows aside.
+pub const PUNCTUAL: &str = include_str!("../wgsl/shared/punctual.wgsl");
+
 /// The rows of probes; after [`GRID`].
 const ROWS: &str = include_str!("../wgsl/shared/rows.wgsl");
 
@@ -52,7 +58,7 @@ pub fn form_factor_sums() -> String {
 /// The direct light at the points that phase 1 lights; entry point `direct`, 64 invocations per workgroup, one per span of points.
 #[must_use]
 pub fn direct() -> String {
-    [include_str!("../wgsl/shared/punctual.wgsl"), POINT, include_str!("../wgsl/direct.wgsl")].join("\n")
+    [PUNCTUAL, POINT, include_str!("../wgsl/direct.wgsl")].join("\n")
 }
 
 /// The share of a light that the points of phase 1 see by one of its shadow maps; entry point `shadow`, 64 invocations per workgroup, one per
@@ -183,10 +189,9 @@ impl Gathering {
         } else {
             include_str!("../wgsl/shared/no_moving_texture.wgsl")
         };
-        let view = include_str!("../wgsl/shared/view.wgsl");
         let gather = include_str!("../wgsl/gather_deferred.wgsl");
         let gather = if float { gather.replace("rgba16float", "rgba32float") } else { gather.to_owned() };
-        [&self.indirect(), view, tags, moving, count, &gather].join("\n")
+        [&self.indirect(), VIEW, tags, moving, count, &gather].join("\n")
     }
 
     fn name(self) -> &'static str {

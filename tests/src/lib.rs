@@ -14,6 +14,7 @@ pub mod active_hemisphere;
 pub mod baked;
 pub mod runtime_gpu;
 pub mod shadow_maps;
+pub mod viewing;
 pub mod thesis;
 pub mod plot;
 pub mod random;

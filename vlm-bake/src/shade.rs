@@ -222,7 +222,9 @@ fn sides_of(scene: &Scene, primitive: u32) -> Sides {
     }
 }
 
-fn punctual_light(light: &scene::PunctualLight) -> punctual::PunctualLight {
+/// A light of the scene as rays and devices evaluate it.
+#[must_use]
+pub fn punctual_light(light: &scene::PunctualLight) -> punctual::PunctualLight {
     let point = punctual::PunctualLight {
         direction: light.direction,
         range: light.range,

@@ -10,7 +10,7 @@ use wgpu::{
 use crate::direct::write;
 use crate::error::{Error, within};
 use crate::frame::{IrradianceFormat, Settings, Targets};
-use crate::pass::{self, Buffers, Passes, group, layout, storage, uniform};
+use crate::pass::{Buffers, Compiled, Passes, group, layout, storage, uniform};
 use crate::upload::Uploaded;
 
 /// Pixels of a workgroup along x and y, as in the shader.
@@ -34,7 +34,7 @@ pub(crate) struct Gather {
 
 impl Gather {
     pub(crate) fn new(
-        buffers: &mut Buffers,
+        (buffers, compiled): (&mut Buffers, &mut Compiled),
         common: &BindGroupLayout,
         uploaded: &Uploaded,
         gathering: Gathering,
@@ -48,7 +48,7 @@ impl Gather {
         let groups = [common, &scene_layout, &target_layout];
         Ok(Self {
             gathering,
-            pipeline: pass::pipeline(device, "gather", &source, &groups),
+            pipeline: compiled.pipeline(device, "gather", &source, &groups),
             scene_layout,
             scene_group,
             target_layout,

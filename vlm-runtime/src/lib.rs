@@ -25,6 +25,9 @@ mod gather;
 mod loaded;
 mod renderer;
 
+#[cfg(feature = "view")]
+pub mod view;
+
 pub use device::{check_limits, request_device, request_device_with};
 pub use error::Error;
 pub use frame::{Frame, IrradianceFormat, MovedNode, Settings, ShadowMap, Targets, Visibility};

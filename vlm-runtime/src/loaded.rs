@@ -36,6 +36,8 @@ pub(crate) struct Loaded {
     pub(crate) changes: Changes,
     /// Nodes that are not at rest.
     pub(crate) moved: Vec<MovedNode>,
+    /// Factors of the lights; 1 where there is none.
+    pub(crate) tints: Vec<Vec3>,
     /// The radiosity of all lights is to be found anew.
     pub(crate) is_stale: bool,
     pub(crate) is_prepared: bool,
@@ -168,6 +170,31 @@ impl Loaded {
         self.shadow.points_moved();
         let bytes: u64 = elsewhere.into_iter().map(|lights| self.write_moved(queue, lights)).sum();
         Ok(bytes + self.write_listed(queue, &listed))
+    }
+
+    /// Writes the reflectances and emissions of the lights from the first to the last whose tint changed; bytes written.
+    pub(crate) fn tint(&mut self, queue: &Queue, tints: &[Vec3]) -> u64 {
+        let of = |tints: &[Vec3], light: usize| tints.get(light).copied().unwrap_or(Vec3::ONE);
+        let changes = |light: &usize| of(tints, *light) != of(&self.tints, *light);
+        let set = &self.asset.lights;
+        let (first, last) = ((0..set.len()).find(changes), (0..set.len()).rfind(changes));
+        self.tints = tints.to_vec();
+        let Some((first, last)) = first.zip(last) else { return 0 };
+        let start = |light: usize| set.sample_starts.get(light).map_or(0, |&start| start as usize);
+        let mut samples = set.samples.get(start(first)..start(last + 1)).unwrap_or(&[]).to_vec();
+        for light in first..=last {
+            let tint = of(tints, light);
+            let own = start(light) - start(first)..start(light + 1) - start(first);
+            samples.get_mut(own).unwrap_or_default().iter_mut().for_each(|s| s.reflectance *= tint);
+            if let Some(surface) = self.host.light_surfaces.get_mut(light) {
+                surface.emission = set.emission.get(light).copied().unwrap_or_default() * tint;
+            }
+        }
+        self.is_stale = true;
+        let listed = self.lights_of(&self.moved);
+        write(queue, &self.uploaded.samples, start(first), &samples)
+            + write(queue, &self.uploaded.light_surfaces, 0, &self.host.light_surfaces)
+            + self.write_listed(queue, &listed)
     }
 
     fn rest(&self, node: u32) -> Option<DMat4> {

@@ -85,6 +85,28 @@ pub(crate) fn pipeline(
     })
 }
 
+/// Pipelines by their source, so that another asset compiles nothing that was compiled before.
+#[derive(Default)]
+pub(crate) struct Compiled(Vec<(String, ComputePipeline)>);
+
+impl Compiled {
+    /// As [`pipeline`]; layouts of the same source are taken to be the same.
+    pub(crate) fn pipeline(
+        &mut self,
+        device: &Device,
+        entry_point: &str,
+        source: &str,
+        groups: &[&BindGroupLayout],
+    ) -> ComputePipeline {
+        if let Some((_, known)) = self.0.iter().find(|(known, _)| known == source) {
+            return known.clone();
+        }
+        let made = pipeline(device, entry_point, source, groups);
+        self.0.push((source.to_owned(), made.clone()));
+        made
+    }
+}
+
 /// Buffers at their bindings.
 pub(crate) fn group<'a>(
     device: &Device,

@@ -6,7 +6,7 @@ use wgpu::{BindGroup, BindGroupLayout, Buffer, ComputePipeline, Device};
 
 use crate::dependents::Dependents;
 use crate::error::Error;
-use crate::pass::{self, Passes, Worklist, group, layout, some_workgroups, storage, workgroups};
+use crate::pass::{Compiled, Passes, Worklist, group, layout, some_workgroups, storage, workgroups};
 use crate::upload::{GridBuffers, Uploaded};
 
 /// The passes for an asset.
@@ -28,7 +28,7 @@ struct Pass {
 
 impl Refresh {
     pub(crate) fn new(
-        device: &Device,
+        (device, compiled): (&Device, &mut Compiled),
         common: &BindGroupLayout,
         uploaded: &Uploaded,
         grid: &GridBuffers,
@@ -47,10 +47,10 @@ impl Refresh {
         ];
         let free = grid.free.as_ref().map(|free| {
             let bound = [bound[0], bound[1], bound[3], bound[4], (5, free)];
-            Pass::new(device, common, ("refresh_free", &wgsl::refresh_free()), &bound)
+            Pass::new((device, &mut *compiled), common, ("refresh_free", &wgsl::refresh_free()), &bound)
         });
         Ok(Self {
-            surface: Pass::new(device, common, ("refresh", &wgsl::refresh()), &bound),
+            surface: Pass::new((device, compiled), common, ("refresh", &wgsl::refresh()), &bound),
             free,
             free_probes: probes - (header.surface_probes as usize).min(probes),
             work: Worklist::new(header.refreshed, probes),
@@ -77,14 +77,14 @@ impl Refresh {
 impl Pass {
     /// The first five bindings are read, those after them written.
     fn new(
-        device: &Device,
+        (device, compiled): (&Device, &mut Compiled),
         common: &BindGroupLayout,
         (name, source): (&str, &str),
         bound: &[(u32, &Buffer)],
     ) -> Self {
         let bindings: Vec<_> = bound.iter().map(|&(binding, _)| (binding, storage(binding < 5))).collect();
         let layout = layout(device, name, &bindings);
-        let pipeline = pass::pipeline(device, name, source, &[common, &layout]);
+        let pipeline = compiled.pipeline(device, name, source, &[common, &layout]);
         Self { group: group(device, name, &layout, bound), pipeline }
     }
 

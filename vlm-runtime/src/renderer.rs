@@ -16,7 +16,7 @@ use crate::gather::Gather;
 use crate::inject::{Inject, InjectPipeline};
 use crate::load::VlmAsset;
 use crate::loaded::{Loaded, reflectances, shining};
-use crate::pass::{Buffers, Passes, group, layout, storage, uniform};
+use crate::pass::{Buffers, Compiled, Passes, group, layout, storage, uniform};
 use crate::refresh::Refresh;
 use crate::shadow::{Shadow, ShadowPipeline};
 use crate::stats::{FrameStats, FrameTimes};
@@ -36,6 +36,8 @@ pub struct VlmRenderer {
     direct: DirectPipeline,
     inject: InjectPipeline,
     timer: Option<Timer>,
+    /// Those that only some assets need.
+    compiled: Compiled,
     loaded: Option<Loaded>,
 }
 
@@ -55,6 +57,7 @@ impl VlmRenderer {
             timer: settings.time_passes.then(|| Timer::new(device)).flatten(),
             settings,
             common,
+            compiled: Compiled::default(),
             loaded: None,
         })
     }
@@ -76,7 +79,8 @@ impl VlmRenderer {
         let gathering = self.gathering(asset, grid);
         let refresh = uploaded.grid.as_ref().zip(grid).map(|(buffers, grid)| {
             let dependents = Dependents::new(grid, &asset.lights);
-            Refresh::new(&self.device, &self.common, &uploaded, buffers, (&host.header, dependents))
+            let on = (&self.device, &mut self.compiled);
+            Refresh::new(on, &self.common, &uploaded, buffers, (&host.header, dependents))
         });
         let mut loaded = Loaded {
             common: group(&self.device, "common", &self.common, &header),
@@ -84,12 +88,19 @@ impl VlmRenderer {
             direct: Direct::new(&self.direct, buffers, &uploaded, points, spans)?,
             inject: Inject::new(&self.device, &self.inject, &uploaded, &host.header)?,
             refresh: refresh.transpose()?,
-            gather: Gather::new(buffers, &self.common, &uploaded, gathering, &self.settings)?,
+            gather: Gather::new(
+                (buffers, &mut self.compiled),
+                &self.common,
+                &uploaded,
+                gathering,
+                &self.settings,
+            )?,
             asset: asset.clone(),
             host,
             uploaded,
             changes,
             moved: Vec::new(),
+            tints: Vec::new(),
             is_stale: true,
             is_prepared: false,
             stats: FrameStats::default(),
@@ -107,6 +118,11 @@ impl VlmRenderer {
         Ok(())
     }
 
+    /// Frees the asset. What was compiled for it stays, and serves the next one.
+    pub fn unload(&mut self) {
+        self.loaded = None;
+    }
+
     fn gathering(&self, asset: &VlmAsset, grid: Option<&Grid>) -> Gathering {
         let listed = grid.is_none() || self.settings.moving_nodes;
         let tags = listed && asset.lights.tags.iter().any(|tag| *tag != 0);
@@ -120,6 +136,21 @@ impl VlmRenderer {
     /// [`Error::NotLoaded`].
     pub fn points(&self) -> Result<&[Point], Error> {
         Ok(&self.loaded()?.host.points)
+    }
+
+    /// Multiplies what each of the asset's lights reflects and emits, in their order, from now on; by 1 where there is no factor. Surface for
+    /// which no light stands keeps its own.
+    ///
+    /// # Errors
+    /// [`Error::NotLoaded`]; [`Error::NotFinite`], and then nothing changes.
+    pub fn set_tints(&mut self, queue: &Queue, tints: &[Vec3]) -> Result<(), Error> {
+        let loaded = self.loaded.as_mut().ok_or(Error::NotLoaded)?;
+        if let Some(number) = tints.iter().position(|tint| !tint.is_finite()) {
+            return Err(Error::NotFinite { what: format!("the tint of virtual light {number}") });
+        }
+        let bytes = loaded.tint(queue, tints) + loaded.plan(queue);
+        loaded.stats.bytes_uploaded += bytes;
+        Ok(())
     }
 
     /// Says what the next frame shows, and writes what changed since the last one to the device.

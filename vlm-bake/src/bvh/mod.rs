@@ -65,7 +65,60 @@ pub struct Nearest {
     pub distance: f32,
 }
 
+/// A tree for other devices to walk without a stack: a node is followed by what is in it, and knows what follows that.
+#[derive(Clone, Debug, Default)]
+pub struct FlatBvh {
+    /// Inner nodes and leaves, depth first.
+    pub nodes: Vec<FlatNode>,
+    /// Corners of the triangles in the order in which leaves count them, metres.
+    pub corners: Vec<[Vec3; 3]>,
+    /// As [`Bvh::leave_distance`].
+    pub leave_distance: f32,
+}
+
+/// A node of a [`FlatBvh`]. 32 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct FlatNode {
+    /// Least corner of the box around it, metres.
+    pub least: Vec3,
+    /// Triangles of a leaf; 0 for an inner node.
+    pub count: u32,
+    /// Largest corner.
+    pub most: Vec3,
+    /// A leaf's first triangle; for an inner node the number of the node after all that is in it.
+    pub first: u32,
+}
+
 impl Bvh {
+    /// The tree without what only this processor's queries need.
+    #[must_use]
+    pub fn flat(&self) -> FlatBvh {
+        let mut nodes: Vec<FlatNode> = Vec::with_capacity(self.tree.nodes.len());
+        let mut steps = if self.corners.is_empty() { Vec::new() } else { vec![Step::Enter(0)] };
+        while let Some(step) = steps.pop() {
+            let place = nodes.len() as u32;
+            match step {
+                Step::Leave(inner) => {
+                    if let Some(node) = nodes.get_mut(inner as usize) {
+                        node.first = place;
+                    }
+                }
+                Step::Enter(index) => {
+                    let Some(node) = self.tree.nodes.get(index as usize) else { continue };
+                    let Aabb { min, max, .. } = *node.aabb();
+                    let (count, first) = (node.prim_count, node.first_index);
+                    nodes.push(FlatNode { least: min.into(), count, most: max.into(), first });
+                    if !node.is_leaf() {
+                        steps.extend([Step::Leave(place), Step::Enter(first + 1), Step::Enter(first)]);
+                    }
+                }
+            }
+        }
+        let corners = self.corners.iter().map(|corners| corners.map(Vec3::from)).collect();
+        FlatBvh { nodes, corners, leave_distance: self.leave_distance }
+    }
+
     /// Builds the tree. Triangles with indices out of range or coordinates that are not finite are left out.
     #[must_use]
     pub fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
@@ -241,6 +294,12 @@ impl Bvh {
             }
         }
     }
+}
+
+/// On the way through all nodes.
+enum Step {
+    Enter(u32),
+    Leave(u32),
 }
 
 fn is_nearer(hit: &Hit, best: Option<&Hit>, max_distance: f32) -> bool {

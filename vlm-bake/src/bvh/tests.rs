@@ -168,3 +168,28 @@ fn answers_do_not_depend_on_the_number_of_threads() {
     };
     assert_eq!(with_threads(1), with_threads(3));
 }
+
+#[test]
+fn flat_trees_hold_every_triangle_once_and_skip_whole_subtrees() {
+    let positions: Vec<Vec3> =
+        (0..300).map(|i| Vec3::new((i * 37 % 101) as f32, (i * 53 % 97) as f32, i as f32)).collect();
+    let triangles: Vec<[u32; 3]> = (0..100).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let bvh = Bvh::new(&positions, &triangles);
+    let flat = bvh.flat();
+    let mut seen = vec![0; flat.corners.len()];
+    for (number, node) in flat.nodes.iter().enumerate() {
+        if node.count > 0 {
+            let own = node.first as usize..(node.first + node.count) as usize;
+            seen[own.clone()].iter_mut().for_each(|times| *times += 1);
+            let inside = |p: &Vec3| p.cmpge(node.least).all() && p.cmple(node.most).all();
+            assert!(flat.corners[own].iter().flatten().all(inside));
+        } else {
+            let within = number + 1..node.first as usize;
+            assert!(within.len() >= 2 && within.end <= flat.nodes.len());
+            let inside = |n: &FlatNode| n.least.cmpge(node.least).all() && n.most.cmple(node.most).all();
+            assert!(flat.nodes[within].iter().all(inside));
+        }
+    }
+    assert!(seen.len() == 100 && seen.iter().all(|times| *times == 1));
+    assert!(Bvh::new(&[], &[]).flat().nodes.is_empty());
+}

@@ -4,7 +4,9 @@
 //! means, so they are linear and hold 16 bits per channel: eight would lose the dark ones.
 
 use glam::{Vec2, Vec4};
+use std::borrow::Cow;
 use std::sync::LazyLock;
+use vlm_shaders::cpu::resolve::encode_srgb;
 
 /// A decoded image and its mip chain, linear rgb with straight alpha.
 #[derive(Clone, Debug)]
@@ -107,6 +109,24 @@ impl Texture {
     #[must_use]
     pub fn size(&self) -> [u32; 2] {
         self.levels.first().map_or([0, 0], |level| [level.width, level.height])
+    }
+
+    /// How it is read between and beyond its texels.
+    #[must_use]
+    pub fn sampling(&self) -> Sampling {
+        self.sampling
+    }
+
+    /// Width, height and sRGB texels of every mip level, for devices that read textures themselves. Alpha is linear. Each level's sides are
+    /// half of the one's before, rounded down.
+    pub fn srgb8_levels(&self) -> impl Iterator<Item = (u32, u32, Cow<'_, [[u8; 4]]>)> {
+        self.levels.iter().map(|level| {
+            let texels = match &level.texels {
+                Texels::Srgb8(texels) => texels.into(),
+                Texels::Linear16(texels) => texels.iter().map(|&texel| srgb8_from_linear16(texel)).collect(),
+            };
+            (level.width, level.height, texels)
+        })
     }
 
     /// Trilinear look-up at a mip level (0 is the finest): linear rgb, and alpha, which is coverage under a mask.
@@ -276,6 +296,12 @@ fn linear_from_linear16(texel: [u16; 4]) -> Vec4 {
     Vec4::from_array(texel.map(f32::from)) * (1.0 / 65535.0)
 }
 
+fn srgb8_from_linear16(texel: [u16; 4]) -> [u8; 4] {
+    let linear = linear_from_linear16(texel);
+    let [r, g, b] = encode_srgb(linear.truncate());
+    [r, g, b, (linear.w * 255.0 + 0.5) as u8]
+}
+
 #[inline]
 fn linear_from_srgb8(linear: &[f32; 256], [r, g, b, a]: [u8; 4]) -> Vec4 {
     let linear = |byte: u8| linear[usize::from(byte)];
@@ -321,6 +347,18 @@ mod tests {
             let mean = texture.sample(vec2(0.5, 0.5), 99.0);
             assert!(mean.abs_diff_eq(expected, 1e-4), "{size:?}: {mean} against {expected}");
         }
+    }
+
+    #[test]
+    fn levels_as_bytes_are_what_is_sampled() {
+        let texels: Vec<_> = (0..5 * 3).map(|i| [i * 17, 40, 255 - i, 255]).collect();
+        let texture = texture([5, 3], texels.clone(), Wrap::Clamp);
+        let levels: Vec<_> = texture.srgb8_levels().collect();
+        let sizes: Vec<_> = levels.iter().map(|(w, h, t)| (*w, *h, t.len())).collect();
+        assert_eq!(sizes, [(5, 3, 15), (2, 1, 2), (1, 1, 1)]);
+        assert_eq!(levels[0].2.as_ref(), texels);
+        let mean = linear_from_srgb8(&LINEAR, levels[2].2[0]);
+        assert!(mean.abs_diff_eq(texture.sample(Vec2::ZERO, 9.0), 0.005), "{mean}");
     }
 
     #[test]
