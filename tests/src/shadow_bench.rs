@@ -31,7 +31,7 @@ pub struct Row {
     pub relative_rmse: f64,
     /// Of flux, signed.
     pub energy: f64,
-    /// The pass `shadow` for all maps, seconds; 0 where the device does not tell.
+    /// The pass `shadow` for all maps, seconds; 0 where the device does not tell. Where drawing the maps is not done by then, that is in it.
     pub seconds: f64,
 }
 
@@ -109,7 +109,6 @@ pub fn summary(rows: &[Row]) -> String {
         "offset, texels",
         "relative RMSE",
         "energy",
-        "pass `shadow`, ms",
     ];
     let cells = |row: &Row| {
         let or_none = |text: String| if row.size == 0 { "none".to_owned() } else { text };
@@ -123,7 +122,6 @@ pub fn summary(rows: &[Row]) -> String {
             or_none(row.normal_offset.to_string()),
             format!("{:.4}", row.relative_rmse),
             format!("{:+.2} %", 100.0 * row.energy),
-            or_none(format!("{:.2}", 1e3 * row.seconds)),
         ]
     };
     let rows: Vec<Vec<String>> = rows.iter().map(cells).collect();

@@ -45,7 +45,7 @@ static CORNELL: LazyLock<Baked> = LazyLock::new(|| {
 
 /// Stripes of what moves.
 fn moves(pixel: usize) -> bool {
-    pixel / 4 % 2 == 0
+    (pixel / 4).is_multiple_of(2)
 }
 
 /// A frame in which the pixels of `moves` move, with the real lights this much brighter.

@@ -27,7 +27,7 @@ fn baked(path: &Path) -> Baked {
 fn lights(scene: &Scene) -> Vec<PunctualLight> {
     let [low, high] = scene.bounds().unwrap().map(|v| v.as_vec3());
     let at = |x: f32, y: f32, z: f32| low + (high - low) * Vec3::new(x, y, z);
-    let down = Vec3::new(0.1, -0.9, -0.3).normalize();
+    let down = Vec3::new(0.1, -0.9, -0.3).normalize_or_zero();
     let spot = PunctualLight { direction: down, ..PunctualLight::point(at(0.5, 0.95, 0.6), Vec3::ONE) };
     vec![
         PunctualLight::point(at(0.5, 0.9, 0.5), Vec3::new(1.0, 2.0, 3.0)),

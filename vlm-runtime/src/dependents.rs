@@ -8,7 +8,7 @@ const GROUPS: usize = 256;
 const WORDS: usize = GROUPS / 64;
 
 /// Above this share of all probes, refreshing all of them is as cheap.
-const MOST_PROBES: f32 = 0.75;
+const MOST_PROBES: f32 = 0.9;
 
 /// A bit for each group of elements.
 type Groups = [u64; WORDS];

@@ -130,7 +130,7 @@ impl VlmRenderer {
         Gathering { grid: grid.is_some(), listed, tags, free }
     }
 
-    /// The points for which [`Visibility`] is given, world space: the lights' samples, then surface without a light.
+    /// The points for which [`crate::Visibility`] is given, world space: the lights' samples, then surface without a light.
     ///
     /// # Errors
     /// [`Error::NotLoaded`].
