@@ -7,7 +7,9 @@ use vlm_bake::shade::TraceScene;
 use vlm_runtime::{Error, Frame, PunctualLight, Settings, ShadowMap, Visibility, VlmAsset};
 
 use crate::runtime_gpu::{Host, visibility};
-use crate::shadow_maps::{MapRenderer, RadiosityError, frusta, radiosity_error};
+use vlm_runtime::view::{MapRenderer, frusta};
+
+use crate::shadow_maps::{RadiosityError, radiosity_error};
 use crate::text::table;
 
 /// A scene by maps of one size. Errors are those of [`RadiosityError`], against rays.
@@ -72,7 +74,7 @@ pub fn measure(
         let drawn = renderer.draw(&frusta, size);
         for &normal_offset in offsets {
             let maps: Vec<ShadowMap<'_>> =
-                drawn.iter().map(|map| ShadowMap { normal_offset, ..map.shadow_map() }).collect();
+                drawn.iter().map(|map| ShadowMap { normal_offset, ..map.shadow_map(0) }).collect();
             let (found, seconds) = radiosity(&mut host, &trace.lights, Visibility::Maps(&maps))?;
             rows.push(with_error(Row { size, normal_offset, seconds, ..row.clone() }, &found));
         }

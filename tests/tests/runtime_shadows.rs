@@ -9,12 +9,13 @@ use glam::{Mat4, Vec3, Vec4};
 use vlm_bake::options::Preset;
 use vlm_bake::scene::Scene;
 use vlm_bake::shade::TraceScene;
+use vlm_runtime::view::{DrawnMap, MapRenderer, frusta};
 use vlm_runtime::{Error, Frame, FrameStats, Point, PunctualLight, Settings, ShadowMap, Visibility};
 use vlm_shaders::cpu::shadow::{Depths, ShadowHeader, shadow};
 use vlm_tests::assets;
 use vlm_tests::baked::Baked;
 use vlm_tests::runtime_gpu::{Host, visibility};
-use vlm_tests::shadow_maps::{DrawnMap, MapRenderer, RadiosityError, frusta, radiosity_error};
+use vlm_tests::shadow_maps::{RadiosityError, radiosity_error};
 
 static CORNELL: LazyLock<Baked> =
     LazyLock::new(|| baked(&PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../assets/cornell.glb")));
@@ -45,7 +46,7 @@ fn record(host: &mut Host, frame: &Frame) -> FrameStats {
 }
 
 fn shown(drawn: &[DrawnMap]) -> Vec<ShadowMap<'_>> {
-    drawn.iter().map(DrawnMap::shadow_map).collect()
+    drawn.iter().map(|map| map.shadow_map(0)).collect()
 }
 
 /// The depths of a map, rows from the top.
@@ -185,7 +186,7 @@ fn maps_that_cannot_be_read() {
     let mut host = Host::new(asset, Settings::default()).unwrap();
     let lights = lights(scene);
     let drawn = MapRenderer::new(&host.device, &host.queue, scene).draw(&frusta(scene, &lights)[..1], 16);
-    let good = drawn[0].shadow_map();
+    let good = drawn[0].shadow_map(0);
     let tags = host.texture([4, 4], wgpu::TextureFormat::R32Uint, &[0; 64]);
     let mut refused = |map: ShadowMap| {
         let maps = [map];

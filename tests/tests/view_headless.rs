@@ -11,6 +11,7 @@ use vlm_bake::picture::{read_irradiance, write_png};
 use vlm_bake::render::{Method, Rendering};
 use vlm_runtime::view::{Headless, ViewError, headless};
 use vlm_tests::assets;
+use vlm_tests::rooms::relative_rmse;
 use vlm_tests::viewing::{arguments, baked, rendered};
 
 /// Of a pixel's irradiance, over the frame's mean.
@@ -167,4 +168,22 @@ fn what_cannot_be_says_why() {
     assert!(error.to_string().contains("none") && error.exit_code() == 2, "{error}");
     assert!(arguments(&cornell, &["--size", "0x2"]).is_err());
     assert!(arguments(&cornell, &["--method", "reference"]).is_err());
+}
+
+#[test]
+#[cfg_attr(not(has_vulkan), ignore = "no Vulkan driver")]
+fn shadow_maps_give_nearly_the_light_of_rays() {
+    let folder = TempDir::new().unwrap();
+    let file = baked(&asset("cornell.glb"), Preset::Game, folder.path()).unwrap();
+    let by = |shadows: &str| {
+        let flags = ["--size", "64x64", "--shadows", shadows];
+        headless(&arguments(&file, &flags).unwrap()).unwrap()
+    };
+    let [rays, maps] = ["rays", "maps"].map(by);
+    assert_eq!(maps.report.passes, ["shadow", "direct", "inject", "refresh", "gather"]);
+    let error = relative_rmse(&maps.rendering.indirect, &rays.rendering.indirect);
+    println!("relative RMSE {error}");
+    assert!(error > 0.0 && error < 0.01, "{error}");
+    let dimmer: Vec<Vec3> = rays.rendering.indirect.iter().map(|light| *light * 0.98).collect();
+    assert!(relative_rmse(&dimmer, &rays.rendering.indirect) > 0.01, "the negative control");
 }

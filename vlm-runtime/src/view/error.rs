@@ -63,9 +63,6 @@ pub enum ViewError {
         /// The compiler's words.
         reason: String,
     },
-    /// Shadow maps are not there yet.
-    #[error("shadow maps are not there yet: use `--shadows rays`")]
-    NoShadowMaps,
     /// No window.
     #[error(
         "no window: {0}. Without a display, use `--headless`; on Debian, install libxkbcommon-x11-0, libx11-xcb1, libxcursor1 and libxi6"

@@ -1,7 +1,10 @@
 //! indirect: the virtual lights by one method: what the runtime crate does for a game.
 
+use std::sync::Arc;
+
 use glam::{Vec3, Vec4};
 use vlm_bake::render::Method;
+use vlm_bake::scene::Scene;
 use wgpu::CommandEncoder;
 
 use super::arguments::ShadowsArg;
@@ -10,7 +13,8 @@ use super::gpu::Gpu;
 use super::shadows::{Rays, Shadows};
 use super::targets::FrameTargets;
 use crate::{
-    Frame, FrameStats, IrradianceFormat, PunctualLight, Settings, Targets, View, VlmAsset, VlmRenderer,
+    Frame, FrameStats, IrradianceFormat, PunctualLight, Settings, Targets, View, Visibility, VlmAsset,
+    VlmRenderer,
 };
 
 /// A renderer with an asset, and the shadows of its points.
@@ -25,11 +29,11 @@ impl Indirect {
     pub(crate) fn new(
         mut renderer: VlmRenderer,
         asset: &VlmAsset,
-        (shadows, rays): (ShadowsArg, &Rays),
+        (shadows, on): (ShadowsArg, (&Gpu, &Arc<Scene>, &Rays)),
         counts_pairs: bool,
     ) -> Result<Self, ViewError> {
         renderer.load(asset)?;
-        let shadows = Shadows::new(shadows, rays, renderer.points()?)?;
+        let shadows = Shadows::new(shadows, on, renderer.points()?);
         Ok(Self { renderer, shadows, counts_pairs })
     }
 
@@ -49,7 +53,8 @@ impl Indirect {
     ) -> Result<(), ViewError> {
         self.shadows.update(lights, must_wait)?;
         self.renderer.set_tints(&gpu.queue, tints)?;
-        let visibility = self.shadows.visibility();
+        let maps = self.shadows.maps();
+        let visibility = maps.as_deref().map_or_else(|| self.shadows.visibility(), Visibility::Maps);
         Ok(self.renderer.prepare(&gpu.queue, &Frame { lights, visibility, view, ..Frame::default() })?)
     }
 

@@ -10,13 +10,28 @@ use vlm_bake::shade::TraceScene;
 
 use super::arguments::ShadowsArg;
 use super::error::ViewError;
-use crate::frame::Visibility;
+use super::gpu::Gpu;
+use super::shadow_maps::{DrawnMap, MapRenderer, frusta};
+use crate::frame::{ShadowMap, Visibility};
 use crate::{Point, PunctualLight};
 
 /// What finds shadows. New kinds get a variant here and an arm in each method of [`Shadows`].
 enum Source {
     /// Rays on the processor, on a thread of their own.
     Rays(Rays),
+    /// Maps on the device.
+    Maps(Maps),
+}
+
+/// Texels along each side of a shadow map. More of them err less, at four times the memory for twice as many.
+const TEXELS: u32 = 2048;
+
+/// The maps of the last lights.
+struct Maps {
+    renderer: MapRenderer,
+    scene: Arc<Scene>,
+    drawn: Vec<DrawnMap>,
+    revision: u64,
 }
 
 /// The visibility of one renderer's points.
@@ -31,15 +46,18 @@ pub struct Shadows {
 
 impl Shadows {
     /// Shadows of a scene at the points of a renderer.
-    ///
-    /// # Errors
-    /// [`ViewError::NoShadowMaps`].
-    pub fn new(kind: ShadowsArg, rays: &Rays, points: &[Point]) -> Result<Self, ViewError> {
+    #[must_use]
+    pub fn new(kind: ShadowsArg, (gpu, scene, rays): (&Gpu, &Arc<Scene>, &Rays), points: &[Point]) -> Self {
         let source = match kind {
             ShadowsArg::Rays => Source::Rays(rays.clone()),
-            ShadowsArg::Maps => return Err(ViewError::NoShadowMaps),
+            ShadowsArg::Maps => Source::Maps(Maps {
+                renderer: MapRenderer::new(&gpu.device, &gpu.queue, scene),
+                scene: scene.clone(),
+                drawn: Vec::new(),
+                revision: 0,
+            }),
         };
-        Ok(Self { source, points: points.to_vec(), lights: None, pending: None, found: None })
+        Self { source, points: points.to_vec(), lights: None, pending: None, found: None }
     }
 
     /// Asks for the shadows of these lights, and takes what was found so far; waits for it if `must_wait`, or where there is nothing to show.
@@ -52,8 +70,12 @@ impl Shadows {
             lights.iter().map(|light| PunctualLight { intensity: Vec3::ONE, ..*light }).collect();
         loop {
             if self.pending.is_none() && self.lights.as_ref() != Some(&white) {
-                let Source::Rays(rays) = &self.source;
-                self.pending = Some(rays.trace(white.clone(), self.points.clone())?);
+                match &mut self.source {
+                    Source::Rays(rays) => {
+                        self.pending = Some(rays.trace(white.clone(), self.points.clone())?);
+                    }
+                    Source::Maps(maps) => maps.draw(&white),
+                }
                 self.lights = Some(white.clone());
             }
             self.take(must_wait)?;
@@ -86,10 +108,26 @@ impl Shadows {
         self.pending.is_some()
     }
 
-    /// What was found last.
+    /// The maps that were drawn last, where shadows come from maps.
+    #[must_use]
+    pub fn maps(&self) -> Option<Vec<ShadowMap<'_>>> {
+        match &self.source {
+            Source::Rays(_) => None,
+            Source::Maps(maps) => Some(maps.drawn.iter().map(|map| map.shadow_map(maps.revision)).collect()),
+        }
+    }
+
+    /// What rays found last.
     #[must_use]
     pub fn visibility(&self) -> Visibility<'_> {
         self.found.as_deref().map_or(Visibility::Kept, Visibility::Given)
+    }
+}
+
+impl Maps {
+    fn draw(&mut self, lights: &[PunctualLight]) {
+        self.drawn = self.renderer.draw(&frusta(&self.scene, lights), TEXELS);
+        self.revision += 1;
     }
 }
 

@@ -98,7 +98,7 @@ impl Shown {
                 Some(spare) => spare,
                 None => renderer(gpu, method, options.measures)?,
             };
-            let shadows = (options.shadows, &self.rays);
+            let shadows = (options.shadows, (gpu, &self.scene, &self.rays));
             *slot = Some(Indirect::new(renderer, asset, shadows, options.measures)?);
         }
         Ok(slot.as_mut())
