@@ -15,7 +15,8 @@ use vlm_format::GltfFile;
 use vlm_shaders::cpu::gather::Receiver;
 use vlm_tests::assets;
 use vlm_tests::rooms::{
-    ALBEDO, across, add_room, baked, irradiance, mean, relative_rmse, slab, truth, turned, two_rooms,
+    ALBEDO, across, add_room, baked, irradiance, mean, receiver, relative_rmse, slab, truth, turned,
+    two_rooms,
 };
 use vlm_tests::scenes::{add, matte, point_light};
 
@@ -151,6 +152,28 @@ fn the_floor_below_a_table_is_as_dark_as_in_truth() {
     assert!(leak.off() < 0.05, "{}", leak.off());
     assert!(leak.error < 0.05, "{}", leak.error);
     assert!(leak.leaky_off() > 0.05 && leak.leaky_error > 0.05, "the negative control");
+}
+
+/// A niche 0.25 m deep: the wall around it looks the same way, and must not lend it its light.
+#[test]
+fn the_back_of_a_niche_is_as_dark_as_in_truth() {
+    let mut scene = room(Vec3::new(0.0, 2.6, 1.2));
+    let mut wall = |low: Vec3, high: Vec3| add(&mut scene, &slab(low, high), matte(ALBEDO));
+    wall(Vec3::new(-2.0, 0.0, -2.0), Vec3::new(-0.3, 3.0, -1.75));
+    wall(Vec3::new(0.3, 0.0, -2.0), Vec3::new(2.0, 3.0, -1.75));
+    wall(Vec3::new(-0.3, 0.0, -2.0), Vec3::new(0.3, 0.5, -1.75));
+    wall(Vec3::new(-0.3, 1.5, -2.0), Vec3::new(0.3, 3.0, -1.75));
+    let upright = |floor: Vec<Receiver>, z: f32| -> Vec<Receiver> {
+        let turn = |r: &Receiver| receiver(Vec3::new(r.position.x, r.position.z, z), Vec3::Z);
+        floor.iter().map(turn).collect()
+    };
+    let lit = upright(across(Vec2::new(0.4, 0.6), Vec2::new(1.0, 1.4), 16), -1.75);
+    let dark = upright(across(Vec2::new(-0.25, 0.55), Vec2::new(0.25, 1.45), 16), -2.0);
+    let leak = leak("niche", &scene, 1000, [&lit, &dark]);
+    assert!(leak.truth < 0.8, "{}", leak.truth);
+    assert!(leak.off() < 0.05, "{}", leak.off());
+    assert!(leak.error < 0.1, "{}", leak.error);
+    assert!(leak.leaky_off() > 0.05 && leak.leaky_error > 0.1, "the negative control");
 }
 
 #[test]

@@ -8,11 +8,11 @@ use glam::{Vec2, Vec3};
 use vlm_bake::render::LitScene;
 use vlm_bake::scene::{AuthoredMesh, LoadOptions, Scene, load};
 use vlm_bake::shade::TraceScene;
-use vlm_format::{GltfFile, VlmAsset};
+use vlm_format::{GltfFile, Probe, VlmAsset};
 use vlm_shaders::cpu::gather::Receiver;
 use vlm_shaders::cpu::gather_static::Frame;
 use vlm_shaders::cpu::grid::leaf_at;
-use vlm_tests::rooms::across;
+use vlm_tests::rooms::{across, add_room};
 use vlm_tests::scenes::{add, matte, point_light, quad};
 
 fn baked(scene: &Scene, lights: u32) -> VlmAsset {
@@ -149,4 +149,34 @@ fn no_seam_shows_between_cells() {
     assert!(largest_seam(&stepped, &borders) > 4e-4);
     let jump = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f32::max) / mean(&values);
     assert!(jump < 5e-3, "{jump}");
+}
+
+/// In an empty room every probe reaches as far as the walls stand, and along them as far as in the open: no probe is a sliver.
+#[test]
+fn probes_reach_to_walls_and_along_them() {
+    let (low, high) = (Vec3::new(-2.0, 0.0, -2.0), Vec3::new(2.0, 3.0, 2.0));
+    let mut scene = Scene::default();
+    add_room(&mut scene, low, high, &matte(Vec3::splat(0.5)));
+    scene.lights.push(point_light(Vec3::new(0.5, 2.0, 0.3), 100.0));
+    let grid = baked(&scene, 600).grid.unwrap();
+    let probes = &grid.probes[..grid.surface_probes as usize];
+    let off = |probe: &Probe, low: Vec3, high: Vec3| {
+        let open = probe.reach.iter().copied().fold(0.0, f32::max);
+        let bitangent = probe.normal.cross(probe.tangent);
+        let sides = [-probe.tangent, probe.tangent, -bitangent, bitangent];
+        let misses = sides.iter().zip(probe.reach).map(|(side, reach)| {
+            let ahead = Vec3::select(side.cmpge(Vec3::ZERO), high, low) - probe.position;
+            (reach - ahead.dot(*side).min(open)).abs() / open
+        });
+        misses.fold(0.0, f32::max)
+    };
+    let cut = probes
+        .iter()
+        .filter(|probe| probe.reach.iter().any(|reach| *reach < 0.5 * probe.reach[0].max(probe.reach[1])));
+    assert!(cut.count() > 50, "many stand by walls");
+    let worst = |low, high| probes.iter().map(|probe| off(probe, low, high)).fold(0.0, f32::max);
+    let found = worst(low, high);
+    println!("{} probes, off by at most {found} of their reach", probes.len());
+    assert!(found < 0.05, "{found}");
+    assert!(worst(low, high - 0.3 * Vec3::Y) > 0.1, "the negative control: a lower ceiling");
 }

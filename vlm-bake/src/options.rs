@@ -29,7 +29,7 @@ pub struct BakeOptions {
 /// Named sets of options.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Preset {
-    /// A quick look: few lights, two samples each. The light of small objects blurs into that of their surroundings.
+    /// A quick look: few lights, four samples each. The light of small objects blurs into that of their surroundings.
     Draft,
     /// For shipping: follows surfaces to about a thousandth of the scene, four samples a light.
     #[default]
@@ -71,7 +71,7 @@ impl BakeOptions {
     pub fn preset(preset: Preset, visible_triangles: usize) -> Self {
         let lights = preset.lights(visible_triangles);
         let (samples, probes_per_light, fewest_probes, rays, near) = match preset {
-            Preset::Draft => (2, 1.5, 500, 256, 0),
+            Preset::Draft => (4, 1.5, 500, 256, 0),
             Preset::Game => (4, 3.25, 2_000, 512, 16),
             Preset::Quality => (16, 2.0, 4_000, 2048, 40),
         };

@@ -204,7 +204,7 @@ fn presets_are_what_they_are_said_to_be() {
     let output = run(["bake", "--help"]);
     let readme = std::fs::read_to_string(repository("README.md")).unwrap();
     for preset in Preset::ALL {
-        let BakeOptions { samples, grid, .. } = BakeOptions::preset(preset, 100_000);
+        let BakeOptions { samples, grid, lights, .. } = BakeOptions::preset(preset, 100_000);
         let help = text(&output.stdout);
         let help = help
             .lines()
@@ -216,5 +216,8 @@ fn presets_are_what_they_are_said_to_be() {
         assert_eq!(told[3], samples.to_string(), "{row}");
         let probes = told[4].replace(',', "");
         assert!(probes.ends_with(&format!(" {} {}", grid.rays, grid.near)), "{row}");
+        let a_light = f64::from(grid.probes) / f64::from(lights);
+        let fewest = BakeOptions::preset(preset, 1).grid.probes;
+        assert!(probes.starts_with(&format!("{a_light} ({fewest} at least)")), "{row}");
     }
 }

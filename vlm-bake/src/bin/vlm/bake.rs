@@ -65,7 +65,7 @@ pub struct BakeArgs {
 /// Presets by name.
 #[derive(Clone, Copy, ValueEnum)]
 enum PresetArg {
-    /// A quick look: 5 % of the triangles as lights (120 to 4,000), 2 samples each
+    /// A quick look: 5 % of the triangles as lights (120 to 4,000), 4 samples each
     Draft,
     /// For shipping: 20 % of the triangles (460 to 16,000), 4 samples each
     Game,
