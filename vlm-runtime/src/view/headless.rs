@@ -77,11 +77,11 @@ pub fn headless(arguments: &Arguments) -> Result<Headless, ViewError> {
     };
     viewer.show(opened, &mut controls)?;
     let size = arguments.size.unwrap_or(DEFAULT_SIZE);
+    let mut frame = viewer.frame(&controls, &camera, size.into(), true)?;
     for _ in 0..arguments.reloads {
         viewer.show(Opened::open(&arguments.file, options, &Silent)?, &mut controls)?;
-        viewer.frame(&controls, &camera, size.into(), true)?;
+        frame = viewer.frame(&controls, &camera, size.into(), true)?;
     }
-    let frame = viewer.frame(&controls, &camera, size.into(), true)?;
     let rendering = viewer.rendering(&frame)?;
     if let Some(path) = &arguments.irradiance {
         write_irradiance(&rendering, path)?;

@@ -137,10 +137,10 @@ impl Viewer {
         self.overlay.take(overlays);
         controls.adopt(&shown.scene, opened.groups);
         let before = self.shown.replace(shown);
-        self.spare = before.map_or([None, None], |before| {
-            let [vlm, brute] = before.indirect;
-            [vlm, brute].map(|indirect| indirect.map(Indirect::into_renderer))
-        });
+        if let Some(Shown { indirect: [vlm, brute], spare: [spare_vlm, spare_brute], .. }) = before {
+            let renderer = |indirect: Option<Indirect>| indirect.map(Indirect::into_renderer);
+            self.spare = [renderer(vlm).or(spare_vlm), renderer(brute).or(spare_brute)];
+        }
         self.generation += 1;
         Ok(())
     }

@@ -99,6 +99,11 @@ impl ApplicationHandler for App {
         }
     }
 
+    fn exiting(&mut self, _: &ActiveEventLoop) {
+        // The surface goes before the connection to the display.
+        self.open = None;
+    }
+
     fn new_events(&mut self, _: &ActiveEventLoop, cause: winit::event::StartCause) {
         if let (winit::event::StartCause::ResumeTimeReached { .. }, Some(open)) = (cause, &self.open) {
             open.window.request_redraw();
