@@ -12,6 +12,9 @@ use super::textbook::EdgeForm;
 use crate::gpu::Gpu;
 pub use crate::gpu::GpuError;
 
+/// The textbook form factor, for shaders that say what an edge adds (`edge_term`).
+pub const TEXTBOOK_POLYGON: &str = include_str!("textbook_polygon.wgsl");
+
 /// Invocations per workgroup, as in the shader.
 const WORKGROUP: u32 = 64;
 
@@ -62,7 +65,8 @@ impl GpuFormFactor {
     /// # Errors
     /// As [`GpuFormFactor::new`].
     pub fn textbook() -> Result<Self, GpuError> {
-        Self::with_shader(&[wgsl::FORM_FACTOR, wgsl::RECEIVERS, include_str!("textbook.wgsl")].join("\n"))
+        let shader = include_str!("textbook.wgsl");
+        Self::with_shader(&[wgsl::FORM_FACTOR, wgsl::RECEIVERS, shader, TEXTBOOK_POLYGON].join("\n"))
     }
 
     /// The sum over lights at each point, see [`GpuFormFactor::measure_sums`].

@@ -1,5 +1,5 @@
 // The textbook forms of the form factor on the GPU, by the built-in functions: what the kernel is measured against.
-// Appended to shared/form_factor.wgsl and shared/receivers.wgsl.
+// Appended to shared/form_factor.wgsl and shared/receivers.wgsl, followed by textbook_polygon.wgsl.
 
 // `centroid` chooses the edge's form: 0 acos, 1 atan2, 2 the LTC fit.
 @group(0) @binding(3) var<storage, read> bound: ErrorBound;
@@ -26,38 +26,12 @@ fn edge_term(p: vec3f, q: vec3f, n: vec3f) -> f32 {
     return theta / c_length * dot(n, c);
 }
 
-fn textbook(light: LightGeometry, x: vec3f, n: vec3f) -> f32 {
-    let r = array<vec3f, 3>(light.v0 - x, light.v1 - x, light.v2 - x);
-    if dot(light.normal, r[0]) >= 0.0 {
-        return 0.0;
-    }
-    var polygon: array<vec3f, 4>;
-    var count = 0u;
-    for (var i = 0u; i < 3u; i++) {
-        let j = (i + 1u) % 3u;
-        let z_i = dot(n, r[i]);
-        let z_j = dot(n, r[j]);
-        if z_i >= 0.0 && count < 4u {
-            polygon[count] = normalize(r[i]);
-            count++;
-        }
-        if (z_i >= 0.0) != (z_j >= 0.0) && count < 4u {
-            polygon[count] = normalize(r[i] + (r[j] - r[i]) * (z_i / (z_i - z_j)));
-            count++;
-        }
-    }
-    var sum = 0.0;
-    for (var i = 0u; i < count; i++) {
-        sum += edge_term(polygon[i], polygon[(i + 1u) % count], n);
-    }
-    return clamp(-sum * INVERSE_TAU, 0.0, 1.0);
-}
-
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let i = id.x;
     if i >= arrayLength(&results) {
         return;
     }
-    results[i] = textbook(lights[i], receivers[i].x, receiver_normal(i));
+    let light = lights[i];
+    results[i] = textbook(light.v0, light.v1, light.v2, light.normal, receivers[i].x, receiver_normal(i));
 }

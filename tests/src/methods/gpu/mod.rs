@@ -10,6 +10,7 @@ pub mod vlm;
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Instant;
 
 use vlm_bake::render::{PhaseSeconds, triangle_tags};
@@ -18,11 +19,74 @@ use wgpu::{CommandEncoder, CommandEncoderDescriptor, TextureViewDescriptor};
 
 use super::Entry;
 use super::area_lights::AreaLights;
-use crate::method::{MethodError, Picture, Stage, View};
+use crate::method::{Backend, Baked, Cost, Method, MethodError, Picture, Prepared, Stage, View};
 use crate::runtime_gpu::{Host, Pictures, view as camera_view, visibility};
 
 /// Every method there is on the graphics card.
 pub const ALL: [Entry; 3] = [brute::ENTRY, thesis::ENTRY, vlm::ENTRY];
+
+/// A method of the processor as it is on the graphics card.
+pub struct OnGpu<M> {
+    method: M,
+    prepare: Prepare<M>,
+}
+
+type Prepare<M> = fn(&M, &Stage<'_>) -> Result<Box<dyn Prepared>, MethodError>;
+
+impl<M: Method + 'static> OnGpu<M> {
+    fn boxed(method: M, prepare: Prepare<M>) -> Box<dyn Method> {
+        Box::new(Self { method, prepare })
+    }
+}
+
+impl<M: Method> Method for OnGpu<M> {
+    fn name(&self) -> &'static str {
+        self.method.name()
+    }
+
+    fn knob(&self) -> String {
+        self.method.knob()
+    }
+
+    fn backends(&self) -> &'static [Backend] {
+        &[Backend::Gpu]
+    }
+
+    fn prepare(&self, stage: &Stage<'_>) -> Result<Box<dyn Prepared>, MethodError> {
+        (self.prepare)(&self.method, stage)
+    }
+}
+
+/// Lights that the runtime sums, by their grid or without.
+struct Ready {
+    lights: AreaLights,
+    renderer: Renderer,
+    cost: Cost,
+}
+
+impl Ready {
+    fn boxed(stage: &Stage<'_>, lights: AreaLights, cost: Cost) -> Result<Box<dyn Prepared>, MethodError> {
+        Ok(Box::new(Self { renderer: Renderer::new(stage, &lights)?, lights, cost }))
+    }
+}
+
+impl Prepared for Ready {
+    fn render(&self, view: &View<'_>, _frame: u32) -> Result<Picture, MethodError> {
+        self.renderer.render(view)
+    }
+
+    fn cost(&self) -> Cost {
+        self.cost
+    }
+
+    fn area_lights(&self) -> Option<Arc<Baked>> {
+        Some(Arc::clone(&self.lights.baked))
+    }
+
+    fn device(&self) -> String {
+        self.renderer.device()
+    }
+}
 
 /// The runtime's renderer, with lights that shine anew in every frame.
 struct Renderer {

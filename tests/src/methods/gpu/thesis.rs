@@ -9,50 +9,36 @@ use vlm_bake::options::Preset;
 use vlm_bake::render::PhaseSeconds;
 use wgpu::{BufferUsages, CommandEncoderDescriptor};
 
-use super::Renderer;
+use super::{OnGpu, Renderer};
 use crate::active_hemisphere::{ActiveHemisphere, Lattice};
+use crate::form_factor::gpu::TEXTBOOK_POLYGON;
 use crate::gpu::Gpu;
-use crate::method::{Backend, Baked, Cost, Method, MethodError, Picture, Prepared, Stage, View};
+use crate::method::{Baked, Cost, Method, MethodError, Picture, Prepared, Stage, View};
 use crate::methods::area_lights::AreaLights;
+use crate::methods::thesis::Thesis;
 use crate::methods::{Entry, thesis};
 use crate::thesis::ThesisOptions;
 
 /// The method's line in the table.
 pub const ENTRY: Entry = Entry {
-    name: thesis::ENTRY.name,
-    sweep: |stage| {
-        let settings = thesis::settings(stage).into_iter();
-        settings.map(|thesis| Box::new(GpuThesis(thesis)) as Box<dyn Method>).collect()
-    },
-    proof: || Box::new(GpuThesis(thesis::whole())),
-    tolerance: thesis::ENTRY.tolerance,
+    sweep: |stage| thesis::settings(stage).into_iter().map(on_gpu).collect(),
+    proof: || on_gpu(thesis::whole()),
+    ..thesis::ENTRY
 };
 
 /// Invocations of a workgroup, as in the shader.
 const WORKGROUP: u32 = 64;
 
 /// The method at one setting.
-pub struct GpuThesis(pub thesis::Thesis);
+#[must_use]
+pub fn on_gpu(thesis: Thesis) -> Box<dyn Method> {
+    OnGpu::boxed(thesis, prepare)
+}
 
-impl Method for GpuThesis {
-    fn name(&self) -> &'static str {
-        self.0.name()
-    }
-
-    fn knob(&self) -> String {
-        self.0.knob()
-    }
-
-    fn backends(&self) -> &'static [Backend] {
-        &[Backend::Gpu]
-    }
-
-    fn prepare(&self, stage: &Stage<'_>) -> Result<Box<dyn Prepared>, MethodError> {
-        let baked = stage.baked(&stage.without_grid(Preset::Game, self.0.lights))?;
-        let lights = AreaLights::new(stage, baked)?;
-        let lists = GpuLists::new(&lights, stage.bounds(), &self.0.options)?;
-        Ok(Box::new(Ready { renderer: Renderer::new(stage, &lights)?, lights, lists }))
-    }
+fn prepare(thesis: &Thesis, stage: &Stage<'_>) -> Result<Box<dyn Prepared>, MethodError> {
+    let lights = AreaLights::new(stage, stage.baked(&stage.without_grid(Preset::Game, thesis.lights))?)?;
+    let lists = GpuLists::new(&lights, stage.bounds(), &thesis.options)?;
+    Ok(Box::new(Ready { renderer: Renderer::new(stage, &lights)?, lights, lists }))
 }
 
 struct Ready {
@@ -174,7 +160,7 @@ impl GpuLists {
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
         let lists = gpu.buffer("lists", 4 * cells * u64::from(list), usage);
         let lights = gpu.input("lights", bytemuck::cast_slice(&shader_lights(lights, options.range)));
-        let source = include_str!("thesis.wgsl");
+        let source = &[include_str!("thesis.wgsl"), TEXTBOOK_POLYGON].join("\n");
         let build = gpu.pipeline(source, "build");
         let gather = gpu.pipeline(source, "gather");
         let group = gpu.group(&build, 0, &[&params, &lights, &lists]);

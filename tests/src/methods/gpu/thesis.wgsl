@@ -1,5 +1,5 @@
 // Aquotte 2017 on the graphics card: lists of fixed size by testing every cell against every light, then the textbook form factor of each
-// pixel's list. Mirror: `ThesisGrid` and `gather` in thesis.rs.
+// pixel's list. Followed by textbook_polygon.wgsl. Mirror: `ThesisGrid` and `gather` in thesis.rs.
 
 struct Params {
     // Minimum corner of the grid, metres.
@@ -36,7 +36,6 @@ struct Receiver {
 
 // Ends a list that is not full.
 const END: u32 = 0xffffffffu;
-const INVERSE_TAU: f32 = 0.15915494;
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> lights: array<Light>;
@@ -92,31 +91,8 @@ fn edge_term(p: vec3f, q: vec3f, n: vec3f) -> f32 {
     return acos(clamp(dot(p, q), -1.0, 1.0)) / c_length * dot(n, c);
 }
 
-fn textbook(light: Light, x: vec3f, n: vec3f) -> f32 {
-    let r = array<vec3f, 3>(light.v0 - x, light.v1 - x, light.v2 - x);
-    if dot(light.normal, r[0]) >= 0.0 {
-        return 0.0;
-    }
-    var polygon: array<vec3f, 4>;
-    var count = 0u;
-    for (var i = 0u; i < 3u; i++) {
-        let j = (i + 1u) % 3u;
-        let z_i = dot(n, r[i]);
-        let z_j = dot(n, r[j]);
-        if z_i >= 0.0 && count < 4u {
-            polygon[count] = normalize(r[i]);
-            count++;
-        }
-        if (z_i >= 0.0) != (z_j >= 0.0) && count < 4u {
-            polygon[count] = normalize(r[i] + (r[j] - r[i]) * (z_i / (z_i - z_j)));
-            count++;
-        }
-    }
-    var sum = 0.0;
-    for (var i = 0u; i < count; i++) {
-        sum += edge_term(polygon[i], polygon[(i + 1u) % count], n);
-    }
-    return clamp(-sum * INVERSE_TAU, 0.0, 1.0);
+fn form_factor(light: Light, receiver: Receiver) -> f32 {
+    return textbook(light.v0, light.v1, light.v2, light.normal, receiver.position, receiver.normal);
 }
 
 @compute @workgroup_size(64)
@@ -137,7 +113,7 @@ fn gather(@builtin(global_invocation_id) id: vec3u) {
             if lights[light].tag != 0u && lights[light].tag == receiver.tag {
                 continue;
             }
-            irradiance += radiosities[light].rgb * textbook(lights[light], receiver.position, receiver.normal);
+            irradiance += radiosities[light].rgb * form_factor(lights[light], receiver);
             pairs++;
         }
     }
