@@ -124,10 +124,15 @@ pub fn method_name(row: &Row) -> String {
 /// The method that the project makes.
 const OURS: &str = "vlm";
 
+/// True for the yardstick on any backend.
+pub(crate) fn is_yardstick(name: &str) -> bool {
+    name.strip_prefix(YARDSTICK).is_some_and(|backend| backend.is_empty() || backend.starts_with(" ("))
+}
+
 /// Sorts names: the yardstick, ours, and the others by name.
 pub(crate) fn method_order(name: &str) -> (u8, String) {
     let rank = match name {
-        YARDSTICK => 0,
+        name if is_yardstick(name) => 0,
         name if name.starts_with(OURS) => 1,
         _ => 2,
     };
@@ -306,5 +311,6 @@ mod tests {
         gpu.backend = "gpu".to_owned();
         let scene = &scene_curves(&[gpu, row("a", "c", "vlm", "", 0, 2.0, 0.1)])[0];
         assert_eq!(scene.methods.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(), ["vlm", "vlm (gpu)"]);
+        assert!(is_yardstick("thesis") && is_yardstick("thesis (gpu)") && !is_yardstick("thesis_of_others"));
     }
 }

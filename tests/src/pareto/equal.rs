@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::curves::{MethodCurve, SceneCurves, Spread, YARDSTICK};
+use super::curves::{MethodCurve, SceneCurves, Spread, YARDSTICK, is_yardstick};
 use super::front::{Reading, Sample, error_within, front_samples, seconds_to_reach};
 use super::numbers::{levels, range, short, time};
 
@@ -74,7 +74,7 @@ pub fn table(equal: Equal, scene: &SceneCurves) -> String {
         Equal::Time => ("within", "relative RMSE"),
         Equal::Error => ("relative RMSE", "time"),
     };
-    let yardstick = scene.methods.iter().find(|method| method.name == YARDSTICK);
+    let yardstick = scene.methods.iter().find(|method| is_yardstick(&method.name));
     let levels = equal.levels(scene);
     if levels.is_empty() {
         return "No method has a time and an error above 0.\n".to_owned();
