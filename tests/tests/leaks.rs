@@ -170,10 +170,10 @@ fn the_back_of_a_niche_is_as_dark_as_in_truth() {
     let lit = upright(across(Vec2::new(0.4, 0.6), Vec2::new(1.0, 1.4), 16), -1.75);
     let dark = upright(across(Vec2::new(-0.25, 0.55), Vec2::new(0.25, 1.45), 16), -2.0);
     let leak = leak("niche", &scene, 1000, [&lit, &dark]);
-    assert!(leak.truth < 0.8, "{}", leak.truth);
-    assert!(leak.off() < 0.05, "{}", leak.off());
-    assert!(leak.error < 0.1, "{}", leak.error);
-    assert!(leak.leaky_off() > 0.05 && leak.leaky_error > 0.1, "the negative control");
+    assert!(leak.truth < 0.85, "{}", leak.truth);
+    assert!(leak.off() < 0.06, "{}", leak.off());
+    assert!(leak.error < 0.09, "{}", leak.error);
+    assert!(leak.leaky_off() > 0.06 && leak.leaky_error > 0.09, "the negative control");
 }
 
 #[test]
