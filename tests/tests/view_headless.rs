@@ -159,8 +159,6 @@ fn what_cannot_be_says_why() {
     assert!(error.to_string().contains("broken.gltf") && error.exit_code() == 1, "{error}");
     let error = fails(&cornell, &["--camera", "roof"]);
     assert!(error.to_string().contains("`camera`") && error.exit_code() == 2, "{error}");
-    let error = fails(&cornell, &["--shadows", "maps", "--size", "8x8"]);
-    assert!(error.to_string().contains("--shadows rays") && error.exit_code() == 2, "{error}");
     let error = fails(&cornell, &["--size", "90000x2", "--method", "direct"]);
     assert!(error.to_string().contains("max_texture_dimension_2d") && error.exit_code() == 2, "{error}");
     let path = folder.path().join("none").join("a.png");

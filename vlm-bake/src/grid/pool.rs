@@ -44,7 +44,7 @@ pub fn pool(trace: &TraceScene, probes: u32) -> Vec<Place> {
     let count = probes.saturating_mul(PLACES_PER_PROBE).max(LEAST_PLACES);
     let (drawn, step) = area_steps(&areas, count as usize);
     let looked = drawn.par_iter().enumerate().flat_map_iter(|(i, &triangle)| {
-        let barycentric = uniform_barycentric(i as u64);
+        let barycentric = off_edges(uniform_barycentric(i as u64));
         let [front, back] = trace.lit_sides(triangle);
         let sides = [(front, true), (back, false)].into_iter().filter(|(lit, _)| *lit);
         sides.filter_map(move |(_, front)| {
@@ -54,6 +54,16 @@ pub fn pool(trace: &TraceScene, probes: u32) -> Vec<Place> {
         })
     });
     looked.collect()
+}
+
+/// A place on the very edge of a triangle moves inward: from the line where two walls meet, neither is seen.
+fn off_edges(barycentric: Vec3) -> Vec3 {
+    const LEAST: f32 = 1e-5;
+    if barycentric.min_element() >= LEAST {
+        return barycentric;
+    }
+    let moved = barycentric.max(Vec3::splat(LEAST));
+    moved / moved.element_sum()
 }
 
 /// Looks around from a place; `None` inside of something.
