@@ -109,9 +109,9 @@ fn a_door_that_is_ajar_passes_as_much_as_in_truth() {
     let dark = across(Vec2::new(0.5, -1.9), Vec2::new(3.9, 1.9), 24);
     let leak = leak("door ajar", &scene, 1000, [&lit, &dark]);
     assert!(leak.truth > 1e-3 && leak.truth < 0.2, "{}", leak.truth);
-    assert!(leak.off() < 0.2, "{}", leak.off());
+    assert!(leak.off() < 0.22, "{}", leak.off());
     assert!(leak.error < 0.5, "{}", leak.error);
-    assert!(leak.leaky_off() > 0.2 && leak.leaky_error > 0.5, "the negative control");
+    assert!(leak.leaky_off() > 0.22 && leak.leaky_error > 0.5, "the negative control");
 }
 
 /// A room of 4 x 3 x 4 m with a lamp, cd.
