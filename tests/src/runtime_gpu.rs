@@ -200,7 +200,7 @@ fn create(
     })
 }
 
-/// With reversed depth: that of a perspective camera ends at infinity, that of an orthographic one [`FAR`] away.
+/// With reversed depth: that of a perspective camera ends at infinity, that of an orthographic one 100 m away.
 #[must_use]
 pub fn clip_from_world(camera: &Camera, gbuffer: &GBuffer) -> DMat4 {
     let aspect = f64::from(gbuffer.height) / f64::from(gbuffer.width);
