@@ -1,20 +1,14 @@
 //! A host for `vlm-runtime` without a window: a G-buffer traced on the processor, shadows by its rays, and the picture read back.
 
-use glam::{DMat4, Mat4, Vec3, Vec4};
+use glam::{DMat4, DVec3, Vec3, Vec4};
 use vlm_bake::gbuffer::GBuffer;
-use vlm_bake::scene::{Camera, Projection};
+use vlm_bake::scene::Camera;
 use vlm_bake::shade::{SurfacePoint, TraceScene};
+use vlm_runtime::view::Eye;
 use vlm_runtime::{
-    Error, Frame, FrameStats, Point, PunctualLight, Settings, Targets, View, VlmAsset, VlmRenderer,
-    request_device_with,
+    Error, Frame, FrameStats, Point, Settings, Targets, View, VlmAsset, VlmRenderer, request_device_with,
 };
 use wgpu::{Device, Queue, Texture, TextureFormat, TextureUsages, TextureView};
-
-/// Distance at which the reversed depth is 1, metres.
-const NEAR: f64 = 0.01;
-
-/// Distance at which the reversed depth of an orthographic camera is 0, metres.
-const FAR: f64 = 100.0;
 
 /// A device with an asset loaded.
 pub struct Host {
@@ -54,7 +48,7 @@ impl Host {
     /// Puts a G-buffer on the device; tags by scene triangle.
     #[must_use]
     pub fn upload(&self, gbuffer: &GBuffer, camera: &Camera, tag_of: impl Fn(u32) -> u32) -> Pictures {
-        let clip_from_world = clip_from_world(camera, gbuffer);
+        let clip_from_world = eye(camera, gbuffer).clip_from_world;
         let size = [gbuffer.width, gbuffer.height];
         let of = |value: &dyn Fn(&SurfacePoint) -> Vec4| -> Vec<Vec4> {
             gbuffer.points.iter().map(|point| point.as_ref().map_or(Vec4::ZERO, value)).collect()
@@ -200,31 +194,11 @@ fn create(
     })
 }
 
-/// With reversed depth: that of a perspective camera ends at infinity, that of an orthographic one 100 m away.
-#[must_use]
-pub fn clip_from_world(camera: &Camera, gbuffer: &GBuffer) -> DMat4 {
-    let aspect = f64::from(gbuffer.height) / f64::from(gbuffer.width);
-    let clip_from_view = match camera.projection {
-        Projection::Perspective(angle) => {
-            let up = 1.0 / (0.5 * f64::from(angle)).tan();
-            DMat4::from_cols_array_2d(&[
-                [up * aspect, 0.0, 0.0, 0.0],
-                [0.0, up, 0.0, 0.0],
-                [0.0, 0.0, 0.0, -1.0],
-                [0.0, 0.0, NEAR, 0.0],
-            ])
-        }
-        Projection::Orthographic(half_height) => {
-            let up = 1.0 / f64::from(half_height);
-            DMat4::from_cols_array_2d(&[
-                [up * aspect, 0.0, 0.0, 0.0],
-                [0.0, up, 0.0, 0.0],
-                [0.0, 0.0, 1.0 / FAR, 0.0],
-                [0.0, 0.0, 1.0, 1.0],
-            ])
-        }
-    };
-    clip_from_view * camera.world_from_view.inverse()
+/// The viewer's camera, for what the picture shows.
+fn eye(camera: &Camera, gbuffer: &GBuffer) -> Eye {
+    let shown = || gbuffer.points.iter().flatten().map(|point| point.position.as_dvec3());
+    let bounds = [shown().reduce(DVec3::min), shown().reduce(DVec3::max)].map(Option::unwrap_or_default);
+    Eye::new(camera, [gbuffer.width, gbuffer.height], bounds)
 }
 
 fn depth(clip_from_world: DMat4, point: &SurfacePoint) -> f32 {
@@ -235,17 +209,11 @@ fn depth(clip_from_world: DMat4, point: &SurfacePoint) -> f32 {
 /// The camera as the runtime wants it.
 #[must_use]
 pub fn view(camera: &Camera, gbuffer: &GBuffer, exposure: f32) -> View {
-    let world_from_clip: Mat4 = clip_from_world(camera, gbuffer).inverse().as_mat4();
-    View { world_from_clip, exposure, empty_depth: 0.0, ..View::default() }
+    View { exposure, ..eye(camera, gbuffer).view() }
 }
 
-/// Which lights each point sees, by rays: 0 or 1.
+/// Which of the scene's lights each point sees, by rays: 0 or 1.
 #[must_use]
 pub fn visibility(trace: &TraceScene<'_>, points: &[Point]) -> Vec<f32> {
-    let seen = |light: &PunctualLight, point: &Point| {
-        let white = PunctualLight { intensity: Vec3::ONE, ..*light };
-        let irradiance = trace.irradiance_by(&[white], point.position, point.normal, point.normal);
-        f32::from(u8::from(irradiance != Vec3::ZERO))
-    };
-    trace.lights.iter().flat_map(|light| points.iter().map(move |point| seen(light, point))).collect()
+    vlm_runtime::view::visibility(trace, trace.lights(), points)
 }

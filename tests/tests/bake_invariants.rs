@@ -93,7 +93,7 @@ fn faults(scene: &Scene, Bake { asset, report, .. }: &Bake) -> Vec<String> {
     let lit = lights.iter().filter(|l| lights_itself(l)).count();
     check(lit == 0, format!("{lit} untagged lights light a point for which they stand"));
     if let Some(grid) = &asset.grid {
-        let [unserved, unsorted, bright, tagged] = grid_errors(grid, asset, &lights, &TraceScene::new(scene));
+        let [unserved, unsorted, bright, tagged] = grid_errors(grid, asset, &lights, scene);
         let [blank, unplaced] = volume_errors(grid, scene);
         check(blank == 0, format!("{blank} places of volumes without probes in free space"));
         check(unplaced == 0, format!("{unplaced} probes in free space outside of all volumes"));
@@ -135,16 +135,16 @@ fn is_exposed(trace: &TraceScene<'_>, place: DVec3, normal: DVec3) -> bool {
 
 /// Places of the visible surface that no leaf's probes serve, leaves whose lists do not ascend, probes whose row gives more light than there
 /// is, and near lights that are tagged.
-fn grid_errors(grid: &Grid, asset: &VlmAsset, lights: &[Light], trace: &TraceScene<'_>) -> [usize; 4] {
+fn grid_errors(grid: &Grid, asset: &VlmAsset, lights: &[Light], scene: &Scene) -> [usize; 4] {
     let served = |place: Vec3| {
         leaf_at(grid, place)
             .is_some_and(|leaf| grid.leaves[leaf as usize].probes < grid.leaves[leaf as usize + 1].probes)
     };
-    let unserved = lights
-        .iter()
-        .flat_map(|light| &light.samples)
-        .filter(|(place, normal)| !served(place.as_vec3()) && is_exposed(trace, *place, *normal));
-    let unserved = unserved.count();
+    let all = lights.iter().flat_map(|light| &light.samples);
+    let unserved: Vec<_> = all.filter(|(place, _)| !served(place.as_vec3())).collect();
+    let trace = (!unserved.is_empty()).then(|| TraceScene::new(scene));
+    let unserved =
+        trace.map_or(0, |trace| unserved.iter().filter(|(x, n)| is_exposed(&trace, *x, *n)).count());
     // Numbers of probes in free space are above all others, so the whole list ascends.
     let list = |leaf: &[Leaf]| &grid.leaf_probes[leaf[0].probes as usize..leaf[1].probes as usize];
     let unsorted = grid.leaves.windows(2).filter(|leaf| !list(leaf).is_sorted_by(|a, b| a < b)).count();
@@ -276,19 +276,18 @@ fn a_broken_grid_is_seen() {
     let mut asset = bake(&scene, &options(&scene, 460), &Silent).unwrap().asset;
     let lights = lights(&scene, &asset);
     let grid = asset.grid.take().unwrap();
-    let trace = TraceScene::new(&scene);
-    assert_eq!(grid_errors(&grid, &asset, &lights, &trace), [0; 4]);
+    assert_eq!(grid_errors(&grid, &asset, &lights, &scene), [0; 4]);
     let spoilt = |spoil: &dyn Fn(&mut Grid)| {
         let mut grid = grid.clone();
         spoil(&mut grid);
-        grid_errors(&grid, &asset, &lights, &trace)
+        grid_errors(&grid, &asset, &lights, &scene)
     };
     assert!(spoilt(&|grid| grid.cells.fill(0))[0] > 0);
     assert!(spoilt(&|grid| grid.leaf_probes.reverse())[1] > 0);
     assert!(spoilt(&|grid| grid.probes.iter_mut().for_each(|probe| probe.row_scale *= 2.0))[2] > 0);
     let mut tagged = asset.clone();
     tagged.tags = vec![1; tagged.triangles.len()];
-    assert!(grid_errors(&grid, &tagged, &lights, &trace)[3] > 0);
+    assert!(grid_errors(&grid, &tagged, &lights, &scene)[3] > 0);
 }
 
 #[test]

@@ -2,19 +2,18 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use glam::Vec3;
-use vlm_bake::bake::bake;
 use vlm_bake::gbuffer::GBuffer;
-use vlm_bake::options::{BakeOptions, Preset};
+use vlm_bake::options::Preset;
 use vlm_bake::progress::Silent;
 use vlm_bake::render::{gather_by_grid, triangle_tags};
-use vlm_bake::scene::{LoadOptions, Scene, load};
 use vlm_bake::shade::TraceScene;
 use vlm_format::GltfFile;
 use vlm_runtime::{Frame, FrameStats, IrradianceFormat, PunctualLight, Settings, Visibility, VlmAsset};
 use vlm_tests::assets;
+use vlm_tests::baked::Baked;
 use vlm_tests::runtime_gpu::{Host, view, visibility};
 
 /// Of a pixel's irradiance, over the frame's mean.
@@ -24,25 +23,9 @@ const SHARE: f32 = 0.99;
 /// What halves add, over the pixel's own irradiance: devices may cut the bits below the eleventh.
 const HALF_STEP: f32 = 1.0 / 1024.0;
 
-/// A baked file.
-struct Baked {
-    scene: Scene,
-    asset: VlmAsset,
-}
-
-impl Baked {
-    fn new(path: &Path, preset: Preset) -> Self {
-        let file = GltfFile::open(path).unwrap();
-        let scene = load(&file, &LoadOptions::default()).unwrap();
-        let options = BakeOptions::preset(preset, scene.triangles.len());
-        let asset = bake(&scene, &options, &Silent).unwrap().asset;
-        Self { scene, asset: VlmAsset::new(asset, file.world_from_nodes()) }
-    }
-
-    fn cornell() -> Self {
-        let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../assets/cornell.glb");
-        Self::new(&path, Preset::Game)
-    }
+fn baked_cornell() -> Baked {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../assets/cornell.glb");
+    Baked::open(&path, Preset::Game).unwrap()
 }
 
 /// The share of pixels within [`BOUND`] of the mirror's, with the real lights this much brighter, and what the frame took.
@@ -52,7 +35,7 @@ fn share_within(
     size: [u32; 2],
     (format, brighter): (IrradianceFormat, f32),
 ) -> (f32, FrameStats) {
-    let Baked { scene, asset } = baked;
+    let Baked { scene, asset, .. } = baked;
     let trace = TraceScene::new(scene);
     let camera = &scene.cameras_or_default()[camera];
     let gbuffer = GBuffer::trace(&trace, camera, size[0], size[1]);
@@ -101,7 +84,7 @@ fn check(baked: &Baked, size: [u32; 2]) -> FrameStats {
 #[test]
 #[cfg_attr(not(has_vulkan), ignore = "no Vulkan driver")]
 fn cornell() {
-    let stats = check(&Baked::cornell(), [96, 96]);
+    let stats = check(&baked_cornell(), [96, 96]);
     assert!(stats.uses_grid && stats.lights > 100, "{stats:?}");
     assert_eq!(stats.passes, ["direct", "inject", "refresh", "gather"]);
 }
@@ -110,14 +93,14 @@ fn cornell() {
 #[test]
 #[cfg_attr(not(has_vulkan), ignore = "no Vulkan driver")]
 fn cornell_without_a_grid() {
-    let Baked { scene, asset } = Baked::cornell();
+    let Baked { name, scene, asset } = baked_cornell();
     let mut data = asset.data().clone();
     data.grid = None;
     data.tags = (0..data.triangles.len() as u32).map(|light| 1 + light % 3).collect();
     data.node_tags = scene.objects.iter().map(|object| (object.node, 1 + object.node % 3)).collect();
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../assets/cornell.glb");
     let world_from_node = GltfFile::open(&path).unwrap().world_from_nodes();
-    let baked = Baked { scene, asset: VlmAsset::new(data, world_from_node) };
+    let baked = Baked { name, scene, asset: VlmAsset::new(data, world_from_node) };
     let stats = check(&baked, [48, 48]);
     assert!(!stats.uses_grid && stats.uses_tags, "{stats:?}");
     assert_eq!(stats.passes, ["direct", "inject", "gather"]);
@@ -128,7 +111,7 @@ fn cornell_without_a_grid() {
 #[cfg_attr(not(has_scenes), ignore = "the scenes are neither in VLM_ASSETS nor in ../shared/assets")]
 fn veach_ajar() {
     let Some(path) = assets::find("scenes/veach_ajar.glb") else { return };
-    check(&Baked::new(&path, Preset::Draft), [128, 72]);
+    check(&Baked::open(&path, Preset::Draft).unwrap(), [128, 72]);
 }
 
 #[test]
@@ -136,5 +119,5 @@ fn veach_ajar() {
 #[cfg_attr(not(has_scenes), ignore = "the scenes are neither in VLM_ASSETS nor in ../shared/assets")]
 fn sponza() {
     let Some(path) = assets::find("scenes/sponza.glb") else { return };
-    check(&Baked::new(&path, Preset::Draft), [128, 72]);
+    check(&Baked::open(&path, Preset::Draft).unwrap(), [128, 72]);
 }

@@ -8,6 +8,7 @@
 #![warn(clippy::expect_used, clippy::panic, clippy::unreachable, clippy::todo)]
 
 pub mod options;
+pub mod flags;
 pub mod progress;
 pub mod report;
 

@@ -1,5 +1,6 @@
 //! The knobs of a bake and their presets.
 
+use crate::flags::FlagError;
 use crate::grid::GridOptions;
 
 /// What a bake costs and how fine it is. Start from [`BakeOptions::preset`] and change what you need.
@@ -36,6 +37,14 @@ pub enum Preset {
     Game,
     /// For stills and references: four times the lights of `Game`, sixteen samples each; bakes and renders slower in proportion.
     Quality,
+}
+
+impl std::str::FromStr for Preset {
+    type Err = FlagError;
+
+    fn from_str(name: &str) -> Result<Self, FlagError> {
+        Self::ALL.into_iter().find(|preset| preset.name() == name).ok_or(FlagError::Preset)
+    }
 }
 
 impl Preset {

@@ -81,6 +81,18 @@ impl Timer {
         Some(ComputePassTimestampWrites { query_set, beginning_of_pass_write_index, end_of_pass_write_index })
     }
 
+    /// Ends the pass before that of this number, and begins it, between passes; the device needs `TIMESTAMP_QUERY_INSIDE_ENCODERS`.
+    #[cfg(feature = "view")]
+    pub(crate) fn stamp(&self, encoder: &mut CommandEncoder, pass: usize) {
+        let first = 2 * pass as u32;
+        if (1..=2 * MOST_PASSES).contains(&first) {
+            encoder.write_timestamp(&self.queries, first - 1);
+        }
+        if first < 2 * MOST_PASSES {
+            encoder.write_timestamp(&self.queries, first);
+        }
+    }
+
     /// Adds the way back of a frame's times, if a slot is free.
     pub(crate) fn finish(&mut self, encoder: &mut CommandEncoder, number: u64, passes: &[&'static str]) {
         let passes: Vec<_> = passes.iter().copied().take(MOST_PASSES as usize).collect();

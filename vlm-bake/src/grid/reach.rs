@@ -47,7 +47,10 @@ pub fn probes(trace: &TraceScene, pool: &[Place], spacing: &Spacing, chosen: &[u
 fn probe(trace: &TraceScene, place: &Place, reach: f32) -> Probe {
     let surface = &place.surface;
     let normal = surface.normal;
-    let walls = walls(trace, place, reach);
+    let height = HEIGHT * reach;
+    let up = free(trace, surface.position, surface.geometric_normal, height);
+    let down = free(trace, surface.position, -surface.geometric_normal, height);
+    let walls = walls(trace, place, reach, up);
     let tangent = walls.first().map_or_else(
         || normal.any_orthonormal_vector(),
         |wall| {
@@ -66,10 +69,7 @@ fn probe(trace: &TraceScene, place: &Place, reach: f32) -> Probe {
             sides[side] = along.abs();
         }
     }
-    let height = HEIGHT * reach;
     let least = LEAST * reach;
-    let up = free(trace, surface.position, surface.geometric_normal, height);
-    let down = free(trace, surface.position, -surface.geometric_normal, height);
     let [rise, fall] = relief(trace, place, reach, [up, down]);
     let along_normal = |free: f32, relief: f32| free.min((RELIEF * relief).max(FLAT * reach)).max(least);
     Probe {
@@ -91,11 +91,11 @@ struct Wall {
     facing: Vec3,
 }
 
-/// The walls within reach, nearest first.
-fn walls(trace: &TraceScene, place: &Place, reach: f32) -> Vec<Wall> {
+/// The walls within reach, nearest first; `up` is how far the way along the normal is free.
+fn walls(trace: &TraceScene, place: &Place, reach: f32, up: f32) -> Vec<Wall> {
     let surface = &place.surface;
     let (u, v) = surface.geometric_normal.any_orthonormal_pair();
-    let lift = free(trace, surface.position, surface.geometric_normal, LIFT * reach) * 0.9;
+    let lift = up.min(LIFT * reach) * 0.9;
     let origin =
         trace.bvh.leave(surface.position + surface.geometric_normal * lift, surface.geometric_normal);
     let mut walls: Vec<(f32, Wall)> = (0..AROUND)

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Parser, ValueEnum};
+use vlm_bake::flags::{positive, size};
 use vlm_bake::options::Preset;
 use vlm_bake::render::Method;
 
@@ -28,8 +29,8 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value = "rays")]
     pub shadows: ShadowsArg,
     /// What a bake costs and gives, for files without a Virtual Light Mesh
-    #[arg(long, value_enum, default_value = "game")]
-    pub preset: PresetArg,
+    #[arg(long, value_name = "draft|game|quality", default_value = "game")]
+    pub preset: Preset,
     /// Cut the holes of alpha masks; without this they count as solid
     #[arg(long)]
     pub alpha_masks: bool,
@@ -83,27 +84,6 @@ pub enum ShadowsArg {
     Maps,
 }
 
-/// Presets by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum PresetArg {
-    /// A quick look
-    Draft,
-    /// For shipping
-    Game,
-    /// For stills
-    Quality,
-}
-
-impl From<PresetArg> for Preset {
-    fn from(preset: PresetArg) -> Self {
-        match preset {
-            PresetArg::Draft => Self::Draft,
-            PresetArg::Game => Self::Game,
-            PresetArg::Quality => Self::Quality,
-        }
-    }
-}
-
 /// Overlays by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum OverlayArg {
@@ -115,16 +95,4 @@ pub enum OverlayArg {
     Cells,
     /// The virtual lights, with the radiosity that was injected
     Radiosity,
-}
-
-fn positive(text: &str) -> Result<f32, String> {
-    let number = text.parse::<f32>().ok().filter(|value| value.is_finite() && *value > 0.0);
-    number.ok_or_else(|| "expected a number above 0".to_owned())
-}
-
-fn size(text: &str) -> Result<(u32, u32), String> {
-    let numbers = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
-    numbers
-        .filter(|&(w, h)| w > 0 && h > 0)
-        .ok_or_else(|| "expected WIDTHxHEIGHT, such as 640x480".to_owned())
 }

@@ -7,18 +7,23 @@ use crate::View;
 
 /// A camera's picture of one size.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Eye {
+pub struct Eye {
+    /// With reversed depth.
     pub clip_from_world: DMat4,
+    /// Metres.
     pub position: Vec3,
+    /// Unit direction to the middle of the picture.
     pub forward: Vec3,
+    /// It looks from one point, not along one direction.
     pub is_perspective: bool,
     /// Metres: where the reversed depth is 1 (perspective), or 0 (orthographic).
     pub depth_scale: f32,
 }
 
 impl Eye {
-    /// `bounds` are those of the scene: an orthographic picture is as deep as that takes.
-    pub(crate) fn new(camera: &Camera, [width, height]: [u32; 2], bounds: [DVec3; 2]) -> Self {
+    /// `bounds` are those of the scene, metres: an orthographic picture is as deep as that takes.
+    #[must_use]
+    pub fn new(camera: &Camera, [width, height]: [u32; 2], bounds: [DVec3; 2]) -> Self {
         let aspect = f64::from(width) / f64::from(height).max(1.0);
         let view_from_world = camera.world_from_view.inverse();
         let extent = (bounds[1] - bounds[0]).length().max(f64::MIN_POSITIVE);
@@ -42,7 +47,8 @@ impl Eye {
     }
 
     /// As the gather wants it.
-    pub(crate) fn view(&self) -> View {
+    #[must_use]
+    pub fn view(&self) -> View {
         let world_from_clip: Mat4 = self.clip_from_world.inverse().as_mat4();
         View { world_from_clip, exposure: 1.0, empty_depth: 0.0, ..View::default() }
     }

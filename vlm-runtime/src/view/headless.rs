@@ -58,7 +58,7 @@ pub struct Headless {
 /// Whatever keeps it from being made or written.
 pub fn headless(arguments: &Arguments) -> Result<Headless, ViewError> {
     let method = Method::from(arguments.method);
-    let options = OpenOptions { preset: arguments.preset.into(), needs_lights: method != Method::Direct };
+    let options = OpenOptions { preset: arguments.preset, needs_lights: method != Method::Direct };
     let opened = Opened::open(&arguments.file, options, &Silent)?;
     let camera = opened.scene.camera(arguments.camera.as_deref())?;
     for note in &opened.notes {

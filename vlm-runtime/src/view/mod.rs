@@ -34,10 +34,10 @@ mod headless;
 #[cfg(test)]
 mod shader_tests;
 
-pub use arguments::{Arguments, MethodArg, OverlayArg, PresetArg, ShadowsArg};
+pub use arguments::{Arguments, MethodArg, OverlayArg, ShadowsArg};
 pub use controls::{BounceControl, Controls, LightControl, Overlays};
 pub use error::ViewError;
-pub use eye::Flight;
+pub use eye::{Eye, Flight};
 pub use gpu::Gpu;
 pub use headless::{Headless, ViewReport, headless, write_picture};
 pub use open::{LightGroup, OpenOptions, Opened};

@@ -168,12 +168,12 @@ impl Rays {
     }
 }
 
-/// 1 where a point sees a light and faces it, else 0: `light * points + point`.
+/// 1 where a point sees a light and faces it, whatever the light's colour, else 0: `light * points + point`.
 #[must_use]
 pub fn visibility(trace: &TraceScene<'_>, lights: &[PunctualLight], points: &[Point]) -> Vec<f32> {
     let sees = |light: &PunctualLight, point: &Point| {
-        let irradiance =
-            trace.irradiance_by(std::slice::from_ref(light), point.position, point.normal, point.normal);
+        let white = PunctualLight { intensity: Vec3::ONE, ..*light };
+        let irradiance = trace.irradiance_by(&[white], point.position, point.normal, point.normal);
         if irradiance == Vec3::ZERO { 0.0 } else { 1.0 }
     };
     lights

@@ -27,7 +27,7 @@ pub struct BakeArgs {
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     scenes: Option<Vec<String>>,
     /// What the bakes cost and give
-    #[arg(long, value_name = "draft|game|quality", default_value = "game", value_parser = preset)]
+    #[arg(long, value_name = "draft|game|quality", default_value = "game")]
     preset: Preset,
     /// Interleaved repeats, of which the median counts
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
@@ -48,7 +48,6 @@ pub struct ChildArgs {
     /// File to write
     output: PathBuf,
     /// Name of the preset
-    #[arg(value_parser = preset)]
     preset: Preset,
 }
 
@@ -72,11 +71,6 @@ fn sizes(text: &str) -> Result<Sizes, String> {
         return Err(format!("{first} is above {last}"));
     }
     Ok(Sizes(std::iter::successors(Some(first), |size| Some(size * 10)).take_while(|&s| s <= last).collect()))
-}
-
-fn preset(name: &str) -> Result<Preset, String> {
-    let found = Preset::ALL.into_iter().find(|preset| preset.name() == name);
-    found.ok_or_else(|| "expected draft, game or quality".to_owned())
 }
 
 /// Runs the command.

@@ -11,7 +11,7 @@ use vlm_tests::breakdown::{BreakdownOptions, measure, table};
 use vlm_tests::pareto::scene;
 use vlm_tests::truth::Truths;
 
-use crate::output::make_folder;
+use crate::output::{make_folder, write_run};
 
 /// Flags of `vlm-bench breakdown`.
 #[derive(Args)]
@@ -21,7 +21,7 @@ pub struct BreakdownArgs {
     scenes: Vec<String>,
     /// Presets, separated by commas
     #[arg(long, value_delimiter = ',', default_value = "game")]
-    presets: Vec<String>,
+    presets: Vec<Preset>,
     /// Only cameras whose name has this in it
     #[arg(long, default_value = "")]
     camera: String,
@@ -72,7 +72,7 @@ pub fn run(args: &BreakdownArgs) -> Result<(), Box<dyn Error>> {
             pictures: args.out.clone(),
             lights_spp: if args.causes { args.spp } else { 0 },
         };
-        for preset in Preset::ALL.into_iter().filter(|p| args.presets.iter().any(|name| name == p.name())) {
+        for &preset in &args.presets {
             let mut bake = BakeOptions::preset(preset, scene.triangles.len());
             bake.lights = args.lights.unwrap_or(bake.lights);
             bake.grid.probes = args.probes.unwrap_or(bake.grid.probes);
@@ -83,11 +83,5 @@ pub fn run(args: &BreakdownArgs) -> Result<(), Box<dyn Error>> {
     }
     let text = table(&rows);
     println!("{text}");
-    if let Some(out) = &args.out {
-        let mut raw = csv::Writer::from_path(out.join("raw.csv"))?;
-        rows.iter().try_for_each(|row| raw.serialize(row))?;
-        raw.flush()?;
-        std::fs::write(out.join("table.md"), text)?;
-    }
-    Ok(())
+    args.out.as_deref().map_or(Ok(()), |out| write_run(out, &rows, &text))
 }

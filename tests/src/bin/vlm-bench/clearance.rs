@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use vlm_tests::clearance_bench::{files, measure, summary};
 
-use crate::output::make_folder;
+use crate::output::write_run;
 
 /// Flags of `vlm-bench clearance`.
 #[derive(Args)]
@@ -37,12 +37,5 @@ pub fn run(args: &ClearanceArgs) -> Result<(), Box<dyn Error>> {
     }
     let text = summary(&rows);
     println!("{text}");
-    if let Some(out) = &args.out {
-        make_folder(out)?;
-        let mut raw = csv::Writer::from_path(out.join("raw.csv"))?;
-        rows.iter().try_for_each(|row| raw.serialize(row))?;
-        raw.flush()?;
-        std::fs::write(out.join("table.md"), text)?;
-    }
-    Ok(())
+    args.out.as_deref().map_or(Ok(()), |out| write_run(out, &rows, &text))
 }

@@ -4,14 +4,13 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use vlm_bake::flags::size;
 use vlm_bake::options::Preset;
 use vlm_bake::shade::TraceScene;
 use vlm_tests::baked::Baked;
 use vlm_tests::frame_bench::{GpuFrame, Row, measure_cpu, summary};
 
-use crate::output::make_folder;
-use crate::render::size;
-use crate::shadows::preset;
+use crate::output::write_run;
 
 /// Flags of `vlm-bench frame`.
 #[derive(Args)]
@@ -29,7 +28,7 @@ pub struct FrameArgs {
     #[arg(long, value_name = "NS", value_delimiter = ',', default_value = "0")]
     lights: Vec<u32>,
     /// Preset of the bake: draft, game or quality
-    #[arg(long, default_value = "draft", value_parser = preset)]
+    #[arg(long, value_name = "draft|game|quality", default_value = "draft")]
     preset: Preset,
     /// What runs the passes
     #[arg(long, value_enum, value_delimiter = ',', default_value = "gpu")]
@@ -73,14 +72,7 @@ pub fn run(args: &FrameArgs) -> Result<(), Box<dyn Error>> {
     } else {
         println!("{text}");
     }
-    if let Some(out) = &args.out {
-        make_folder(out)?;
-        let mut raw = csv::Writer::from_path(out.join("raw.csv"))?;
-        rows.iter().try_for_each(|row| raw.serialize(row))?;
-        raw.flush()?;
-        std::fs::write(out.join("table.md"), text)?;
-    }
-    Ok(())
+    args.out.as_deref().map_or(Ok(()), |out| write_run(out, &rows, &text))
 }
 
 /// All sizes and budgets, one after the other in each repeat.

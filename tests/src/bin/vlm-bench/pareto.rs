@@ -5,12 +5,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
+use vlm_bake::flags::size;
 use vlm_tests::method::Backend;
 use vlm_tests::pareto;
 use vlm_tests::pareto::run::{RunOptions, run};
 use vlm_tests::truth::Spp;
-
-use crate::render::size;
 
 /// Flags of `vlm-bench pareto`.
 #[derive(Args)]

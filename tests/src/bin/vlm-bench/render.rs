@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
+use vlm_bake::flags::size;
 use vlm_bake::picture::{read_irradiance, write_irradiance, write_png};
 use vlm_bake::progress::Silent;
 use vlm_bake::render::{Method, RenderError, RenderOptions, RenderReport, RenderStats, Rendering, render};
@@ -104,14 +105,6 @@ struct BenchReport {
     thesis: Option<ThesisReport>,
     #[serde(skip_serializing_if = "Option::is_none")]
     metrics: Option<Metrics>,
-}
-
-/// Parses `WIDTHxHEIGHT`.
-pub fn size(text: &str) -> Result<(u32, u32), String> {
-    let numbers = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
-    numbers
-        .filter(|&(w, h)| w > 0 && h > 0)
-        .ok_or_else(|| "expected WIDTHxHEIGHT, such as 640x480".to_owned())
 }
 
 /// Runs the command.

@@ -8,7 +8,7 @@ use vlm_bake::options::Preset;
 use vlm_tests::baked::Baked;
 use vlm_tests::shadow_bench::{measure, summary};
 
-use crate::output::make_folder;
+use crate::output::write_run;
 
 /// Flags of `vlm-bench shadows`.
 #[derive(Args)]
@@ -24,17 +24,11 @@ pub struct ShadowsArgs {
     #[arg(long, value_name = "NS", value_delimiter = ',', default_value = "2")]
     offsets: Vec<f32>,
     /// Preset of the bake: draft, game or quality
-    #[arg(long, default_value = "draft", value_parser = preset)]
+    #[arg(long, value_name = "draft|game|quality", default_value = "draft")]
     preset: Preset,
     /// Also write raw.csv and table.md into this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-}
-
-/// A preset by its name.
-pub fn preset(text: &str) -> Result<Preset, String> {
-    let found = Preset::ALL.into_iter().find(|preset| preset.name() == text);
-    found.ok_or_else(|| "expected draft, game or quality".to_owned())
 }
 
 /// Runs the command.
@@ -50,12 +44,5 @@ pub fn run(args: &ShadowsArgs) -> Result<(), Box<dyn Error>> {
     }
     let text = summary(&rows);
     println!("{text}");
-    if let Some(out) = &args.out {
-        make_folder(out)?;
-        let mut raw = csv::Writer::from_path(out.join("raw.csv"))?;
-        rows.iter().try_for_each(|row| raw.serialize(row))?;
-        raw.flush()?;
-        std::fs::write(out.join("table.md"), text)?;
-    }
-    Ok(())
+    args.out.as_deref().map_or(Ok(()), |out| write_run(out, &rows, &text))
 }

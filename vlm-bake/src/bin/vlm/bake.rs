@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use vlm_bake::bake::{Bake, bake};
+use vlm_bake::flags::positive;
 use vlm_bake::grid::GridOptions;
 use vlm_bake::options::{BakeOptions, Preset};
 use vlm_bake::picture::write_png;
@@ -80,13 +81,6 @@ impl From<PresetArg> for Preset {
             PresetArg::Game => Self::Game,
             PresetArg::Quality => Self::Quality,
         }
-    }
-}
-
-fn positive(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err("expected a length in metres above 0".to_owned()),
     }
 }
 

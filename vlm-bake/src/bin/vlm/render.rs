@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use vlm_bake::flags::{positive, size};
 use vlm_bake::picture::{write_irradiance, write_png};
 use vlm_bake::progress::Progress;
 use vlm_bake::render::{Method, RenderOptions, RenderReport, Rendering, render};
@@ -69,18 +70,6 @@ impl From<MethodArg> for Method {
             MethodArg::Reference => Self::Reference,
         }
     }
-}
-
-fn positive(text: &str) -> Result<f32, String> {
-    let number = text.parse::<f32>().ok().filter(|value| value.is_finite() && *value > 0.0);
-    number.ok_or_else(|| "expected a number above 0".to_owned())
-}
-
-fn size(text: &str) -> Result<(u32, u32), String> {
-    let numbers = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
-    numbers
-        .filter(|&(w, h)| w > 0 && h > 0)
-        .ok_or_else(|| "expected WIDTHxHEIGHT, such as 640x480".to_owned())
 }
 
 /// Runs the command.

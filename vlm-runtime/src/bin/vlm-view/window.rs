@@ -212,7 +212,7 @@ fn session(
     let sources = Sources::for_this_build();
     let options = WatchOptions {
         file: arguments.file.clone(),
-        open: OpenOptions { preset: arguments.preset.into(), needs_lights: true },
+        open: OpenOptions { preset: arguments.preset, needs_lights: true },
         shaders: sources.files(),
         follow: FollowOptions::default(),
     };
