@@ -13,7 +13,8 @@ use crate::decimate::{Decimation, LightMesh, decimate};
 use crate::flux::{conserve, steer};
 use crate::grid::{GridInput, GridOptions, Pieces, StandIns, grid};
 use crate::ground::Ground;
-use crate::mend::{mend, thinned};
+use crate::memory::{self, Last, Memory};
+use crate::mend::{Hidden, mend, thinned};
 use crate::offset::Surroundings;
 use crate::options::BakeOptions;
 use crate::patches::{Patches, patches};
@@ -83,6 +84,20 @@ pub enum BakeError {
 /// [`BakeError::NothingReflects`] if no surface makes lights and no artist made any; [`BakeError::NothingLeft`] if the
 /// budget leaves none; [`BakeError::Cancelled`] soon after `progress` is.
 pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Result<Bake, BakeError> {
+    rebake(scene, options, &mut Memory::default(), progress)
+}
+
+/// Bakes as [`bake()`] does, to the same bytes, but uses what `memory` holds of the last bake wherever nothing changed on which it depends: a
+/// new colour moves no light and traces no ray. [`Report::reused`] tells which stages did not run.
+///
+/// # Errors
+/// As [`bake()`]; the memory then holds the stages that were finished.
+pub fn rebake(
+    scene: &Scene,
+    options: &BakeOptions,
+    memory: &mut Memory,
+    progress: &dyn Progress,
+) -> Result<Bake, BakeError> {
     let mut clock = Clock::new(progress);
 
     clock.stage("patches")?;
@@ -91,23 +106,14 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     if patches.triangles.is_empty() && scene.authored.is_empty() {
         return Err(BakeError::NothingReflects);
     }
-
-    clock.stage("decimate")?;
-    let (mesh, decimation) = decimate(&patches, options);
-
-    clock.stage("mend")?;
     let ground = Ground::new(scene, &patches);
-    let coarse = mesh.lights();
     let points = ground.points(options.lights as usize);
-    let fewer = thinned(&points, coarse.len());
-    let light_of_point = Correspondence::new(&ground, &coarse, |_| true).of(&fewer);
-    let distance = measured_distance(&fewer, &light_of_point, &coarse);
-    let deepest = deepest(ground.clearance, distance.mean_m, decimation.error_m);
-    let around = Surroundings { ground: &ground, deepest, progress };
-    let snap = Snap::new(&patches);
-    let density = densities(scene, &patches, &mesh, &points_of_lights(&light_of_point, coarse.len()));
-    let budget = (options.lights as usize).saturating_sub(authored::count(scene));
-    let hidden = mend(scene, Refiner::new(mesh, density, &snap), budget, &around, &points);
+
+    let shape = memory::of_shape(scene, &patches, options);
+    let mend = || mended(scene, options, &ground, &points, &mut clock);
+    let (mended, is_known) = memory.mended.get_or_try(shape, mend)?;
+    clock.reused(if is_known { &["decimate", "mend"] } else { &[] });
+    let hidden = &mended.hidden;
 
     clock.stage("samples")?;
     let lights = &hidden.lights;
@@ -139,11 +145,11 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
     clock.stage("tag")?;
     let (mut asset, tags, proof) = prove(scene, &mut baked, options, &ground, points);
 
-    clock.stage("grid")?;
+    clock.stage("stand-ins")?;
     let uncovered = uncovered(scene, &patches, &proof, &baked);
     let stand_ins = StandIns::new(scene, &ground, &baked, &uncovered);
     let sources = GridSources { baked: &baked, stand_ins: &stand_ins, uncovered: &uncovered };
-    asset.grid = static_grid(scene, &asset, &sources, &options.grid, progress);
+    asset.grid = static_grid(scene, &asset, &sources, &options.grid, &mut memory.grid, &mut clock)?;
     asset.settings.cell_size = asset.grid.as_ref().map_or(0.0, |grid| grid.cell_size);
 
     let mut report = Report {
@@ -152,7 +158,7 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
         lights: asset.triangles.len(),
         authored_lights: authored_lights(&baked),
         samples: asset.samples.len(),
-        decimation: decimation_report(&decimation, distance),
+        decimation: decimation_report(&mended.decimation, mended.distance),
         offset: offset_report(lights, &hidden.depths),
         clearance: proof.report(),
         area: area_report(&proof, &baked, &tags),
@@ -163,8 +169,43 @@ pub fn bake(scene: &Scene, options: &BakeOptions, progress: &dyn Progress) -> Re
         ..Report::default()
     };
     report.missed_because = why_missed(&report, options);
-    report.seconds = clock.finish()?;
+    (report.seconds, report.reused) = clock.finish()?;
     Ok(Bake { asset, stand_ins, report })
+}
+
+/// Lights in their places, and how far they are from their surface.
+#[derive(Clone, Debug)]
+pub(crate) struct Mended {
+    hidden: Hidden,
+    decimation: Decimation,
+    distance: Distance,
+}
+
+/// Decimates the surface to the budget, and hides the lights behind it.
+fn mended(
+    scene: &Scene,
+    options: &BakeOptions,
+    ground: &Ground,
+    points: &[SurfacePoint],
+    clock: &mut Clock,
+) -> Result<Mended, BakeError> {
+    clock.stage("decimate")?;
+    let patches = ground.patches;
+    let (mesh, decimation) = decimate(patches, options);
+
+    clock.stage("mend")?;
+    let coarse = mesh.lights();
+    let fewer = thinned(points, coarse.len());
+    let light_of_point = Correspondence::new(ground, &coarse, |_| true).of(&fewer);
+    let distance = measured_distance(&fewer, &light_of_point, &coarse);
+    let deepest = deepest(ground.clearance, distance.mean_m, decimation.error_m);
+    let around = Surroundings { ground, deepest, progress: clock.progress };
+    let snap = Snap::new(patches);
+    let density = densities(scene, patches, &mesh, &points_of_lights(&light_of_point, coarse.len()));
+    let budget = (options.lights as usize).saturating_sub(authored::count(scene));
+    let hidden = mend(scene, Refiner::new(mesh, density, &snap), budget, &around, points);
+    clock.go_on()?;
+    Ok(Mended { hidden, decimation, distance })
 }
 
 /// Surface for which no light stands, in pieces about as large as the surface around a sample.
@@ -189,11 +230,12 @@ fn static_grid(
     asset: &VlmAsset,
     &GridSources { baked, stand_ins, uncovered }: &GridSources,
     options: &GridOptions,
-    progress: &dyn Progress,
-) -> Option<Grid> {
-    let lights = world_lights(scene, asset).ok()?;
+    memory: &mut Last<Option<Grid>>,
+    clock: &mut Clock,
+) -> Result<Option<Grid>, BakeError> {
+    let Ok(lights) = world_lights(scene, asset) else { return Ok(None) };
     let trace = TraceScene::new(scene);
-    let gains: Vec<f32> = baked.iter().map(BakedLight::surface_gain).collect();
+    let area_gains: Vec<f32> = baked.iter().map(BakedLight::area_gain).collect();
     let shares: Vec<f32> = baked.iter().flat_map(|l| &l.samples).map(|s| s.share).collect();
     let light_of_sample: Vec<u32> =
         baked.iter().zip(0..).flat_map(|(light, number)| light.samples.iter().map(move |_| number)).collect();
@@ -205,10 +247,22 @@ fn static_grid(
         stand_ins,
         lights: &lights,
         light_of_sample: &light_of_sample,
-        gains: &gains,
+        area_gains: &area_gains,
         shares: &shares,
     };
-    grid(&input, options, progress)
+    let make = || {
+        clock.stage("grid")?;
+        let grid = grid(&input, options, clock.progress);
+        clock.go_on()?;
+        Ok(grid)
+    };
+    let (grid, is_known) = memory.get_or_try(memory::of_grid(&input, options), make)?;
+    clock.reused(if is_known { &["grid"] } else { &[] });
+    Ok(grid.clone().map(|grid| Grid {
+        surface_gains: baked.iter().map(BakedLight::surface_gain).collect(),
+        uncovered: uncovered.pieces.clone(),
+        ..grid
+    }))
 }
 
 fn authored_lights(lights: &[BakedLight]) -> usize {
@@ -261,7 +315,7 @@ fn densities(scene: &Scene, patches: &Patches, mesh: &LightMesh, standing: &List
 }
 
 /// How far decimated faces lie from their surface.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Distance {
     mean_m: f64,
     p99_m: f64,
@@ -329,11 +383,12 @@ struct Clock<'a> {
     progress: &'a dyn Progress,
     running: Option<(&'static str, Instant)>,
     seconds: BTreeMap<&'static str, f64>,
+    reused: Vec<&'static str>,
 }
 
 impl<'a> Clock<'a> {
     fn new(progress: &'a dyn Progress) -> Self {
-        Self { progress, running: None, seconds: BTreeMap::new() }
+        Self { progress, running: None, seconds: BTreeMap::new(), reused: Vec::new() }
     }
 
     fn stage(&mut self, name: &'static str) -> Result<(), BakeError> {
@@ -357,8 +412,14 @@ impl<'a> Clock<'a> {
         Ok(())
     }
 
-    fn finish(mut self) -> Result<BTreeMap<&'static str, f64>, BakeError> {
+    /// Notes stages that had nothing to do.
+    fn reused(&mut self, stages: &[&'static str]) {
+        self.reused.extend(stages);
+    }
+
+    /// Seconds per stage, and the stages that had nothing to do.
+    fn finish(mut self) -> Result<(BTreeMap<&'static str, f64>, Vec<&'static str>), BakeError> {
         self.stop()?;
-        Ok(self.seconds)
+        Ok((self.seconds, self.reused))
     }
 }

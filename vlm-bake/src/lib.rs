@@ -13,6 +13,7 @@ pub mod progress;
 pub mod report;
 
 pub mod bake;
+pub mod memory;
 pub mod scene;
 pub mod patches;
 pub mod decimate;

@@ -16,7 +16,8 @@ use crate::topology::{area, edge_uses, edges};
 
 /// Two neighbours whose albedos differ by more than this, in the square root of linear albedo (about evenly spaced to
 /// the eye), lie on different sides of a border. Lower values keep more borders, and more lights are spent on them;
-/// higher values let strong textures average out.
+/// higher values let strong textures average out. The material's factor counts as the nearest power of two, so that a small change of it
+/// moves no border.
 const HARD_STEP: f32 = 0.12;
 
 /// Surfaces darker than this (largest channel) that emit nothing make no lights: they return less than a thousandth of
@@ -169,7 +170,8 @@ fn group(patches: &mut Patches, scene: &Scene, surfaces: &[Surface], least_area:
             let two_sided = [a, b].map(|t| patches.triangle_two_sided[t as usize]);
             let one_primitive = scene.triangle_primitive[source[0]] == scene.triangle_primitive[source[1]];
             if one_primitive && two_sided[0] == two_sided[1] {
-                joints.push((step(&surfaces[source[0]], &surfaces[source[1]]), a, b));
+                let brightness = brightness(scene, source[0]);
+                joints.push((step(&surfaces[source[0]], &surfaces[source[1]], brightness), a, b));
             }
         }
     }
@@ -186,9 +188,16 @@ fn group(patches: &mut Patches, scene: &Scene, surfaces: &[Surface], least_area:
     number(patches, scene, &mut islands, &mut regions);
 }
 
-/// How far apart two mean surfaces look; infinite between an emitter and anything unlike it.
-fn step(a: &Surface, b: &Surface) -> f32 {
-    let root = |s: &Surface| Vec3::from_array(s.reflectance().max(Vec3::ZERO).to_array().map(f32::sqrt));
+/// The power of two nearest to the factor of a triangle's material.
+fn brightness(scene: &Scene, triangle: usize) -> f32 {
+    let factor = scene.material_of(triangle).map_or(0.0, |material| material.base_color.max_element());
+    factor.log2().round().exp2()
+}
+
+/// How far apart two mean surfaces of one material look; infinite between an emitter and anything unlike it.
+fn step(a: &Surface, b: &Surface, brightness: f32) -> f32 {
+    let reflectance = |s: &Surface| s.painted * s.coverage * brightness;
+    let root = |s: &Surface| Vec3::from_array(reflectance(s).max(Vec3::ZERO).to_array().map(f32::sqrt));
     let emission = (a.emission - b.emission).abs().max_element();
     if emission > 0.1 * a.emission.max(b.emission).max_element() {
         return f32::INFINITY;

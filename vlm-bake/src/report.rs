@@ -37,8 +37,10 @@ pub struct Report {
     pub flux: Vec<ObjectFlux>,
     /// The grid, all 0 if the asset has none.
     pub grid: GridReport,
-    /// Seconds per stage, in alphabetical order of the stages.
+    /// Seconds per stage that ran, in alphabetical order of the stages.
     pub seconds: BTreeMap<&'static str, f64>,
+    /// Stages that did not run, since nothing changed for them after the last bake. Only a watcher remembers that.
+    pub reused: Vec<&'static str>,
     /// BLAKE3 of the written file, empty before it is written.
     pub hash: String,
     /// What was left out or guessed while the scene was read.

@@ -41,6 +41,9 @@ pub struct BakedLight {
     pub back: bool,
     /// Its radiosity over that of its surface: what it has less in area. 0 for authored ones.
     pub concentration: f32,
+    /// The area of its surface over its own; 0 for authored ones. The concentration before objects' light was conserved, so that no colour
+    /// is in it.
+    pub area_ratio: f32,
     /// 0 for none.
     pub tag: u32,
     /// Its area before it moved behind its surface, square metres; 0 for authored ones.
@@ -57,8 +60,18 @@ impl BakedLight {
     /// Radiosity of its surface over its own; 1 for authored ones, which are their own surface.
     #[must_use]
     pub fn surface_gain(&self) -> f32 {
-        if self.concentration > 0.0 { 1.0 / self.concentration } else { 1.0 }
+        inverse_or_one(self.concentration)
     }
+
+    /// The same by areas alone, whatever the colours.
+    #[must_use]
+    pub fn area_gain(&self) -> f32 {
+        inverse_or_one(self.area_ratio)
+    }
+}
+
+fn inverse_or_one(ratio: f32) -> f32 {
+    if ratio > 0.0 { 1.0 / ratio } else { 1.0 }
 }
 
 /// A sample in world space.
@@ -150,6 +163,7 @@ fn finish_light(
         region: light.region,
         back: light.back,
         concentration: ratio,
+        area_ratio: ratio,
         rest_area,
         accused,
         ..BakedLight::default()

@@ -42,7 +42,7 @@ use crate::scene::Scene;
 use crate::shade::TraceScene;
 
 /// What a grid costs and how exact it is.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GridOptions {
     /// Number of probes on surface; 0 for no grid. More of them resolve borders of shadow and corners better; file, bake and refresh grow in
     /// proportion.
@@ -67,8 +67,8 @@ pub struct GridInput<'a> {
     pub lights: &'a LightSet,
     /// The light of each sample.
     pub light_of_sample: &'a [u32],
-    /// Radiosity of the surface that each light stands for over the light's own.
-    pub gains: &'a [f32],
+    /// Area of each light over that of the surface for which it stands: radiosity of that surface over the light's own, colours aside.
+    pub area_gains: &'a [f32],
     /// The share of its light's area that each sample speaks for.
     pub shares: &'a [f32],
     /// The lights that artists made.
@@ -164,7 +164,7 @@ fn built(
     let mut grid = encode(cells, probes, &near, &far, input.light_of_sample);
     grid.surface_probes = surface_probes as u32;
     grid.sample_shares = input.shares.to_vec();
-    grid.surface_gains = input.gains.to_vec();
+    grid.surface_gains = input.area_gains.to_vec();
     grid.uncovered = input.uncovered.to_vec();
     Some(grid)
 }

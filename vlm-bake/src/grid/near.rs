@@ -56,7 +56,8 @@ impl GridInput<'_> {
         let mut all: Vec<NearLight> = Vec::new();
         let mut near_shares: Vec<f32> = Vec::new();
         for Candidate { light, share, form_factor, .. } in self.candidates(place, probe, &row, most) {
-            near_shares.push((MOST_BRIGHT * form_factor / (share * self.gains[light as usize])).min(1.0));
+            near_shares
+                .push((MOST_BRIGHT * form_factor / (share * self.area_gains[light as usize])).min(1.0));
             all.push(NearLight { light, form_factor, row: Row::new() });
         }
         for (source, share) in &mut row {
@@ -83,7 +84,7 @@ impl GridInput<'_> {
             let change = share * change(self.lights, probe, light);
             if change <= LEAST_CHANGE * all
                 || self.lights.tags[light as usize] != 0
-                || self.gains[light as usize] <= 0.0
+                || self.area_gains[light as usize] <= 0.0
             {
                 return None;
             }

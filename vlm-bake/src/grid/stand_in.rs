@@ -74,6 +74,14 @@ impl StandIns {
         all
     }
 
+    /// The tables' bytes, for fingerprints.
+    pub(crate) fn arrays(&self, mut read: impl FnMut(&[u8])) {
+        let row = |&(first, rows, back): &(u32, u16, bool)| [first, u32::from(rows), u32::from(back)];
+        let triangles: Vec<[u32; 3]> = self.triangles.iter().map(row).collect();
+        read(bytemuck::cast_slice(&triangles));
+        read(bytemuck::cast_slice(&self.samples));
+    }
+
     /// The sample, as the asset numbers them, that speaks for a place.
     #[must_use]
     pub fn sample_at(&self, triangle: u32, barycentric: Vec3, front: bool) -> Option<u32> {

@@ -14,6 +14,8 @@ pub struct Surface {
     pub coverage: f32,
     /// Emitted radiance in cd/m^2 (nt) of what is there.
     pub emission: Vec3,
+    /// Its albedo were the material's base colour factor white: what is painted, whatever the paint is multiplied by.
+    pub painted: Vec3,
 }
 
 /// A triangle is cut into at most this many parts along each edge for its mean, and each part looked up once. Fewer
@@ -145,8 +147,13 @@ impl Patch<'_> {
     }
 
     fn surface(&self, color: Vec3, coverage: f32, emissive: Vec3) -> Surface {
-        let albedo = if self.material.reflects { self.material.base_color * color } else { Vec3::ZERO };
-        Surface { albedo, coverage, emission: self.material.emission * emissive }
+        let painted = if self.material.reflects { color } else { Vec3::ZERO };
+        Surface {
+            albedo: self.material.base_color * painted,
+            coverage,
+            emission: self.material.emission * emissive,
+            painted,
+        }
     }
 
     fn world_area(&self, scene: &Scene) -> f32 {

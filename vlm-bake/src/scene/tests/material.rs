@@ -24,7 +24,7 @@ fn brute_force(scene: &Scene) -> Surface {
             count += 1.0;
         }
     }
-    Surface { albedo: albedo / coverage, coverage: coverage / count, emission: Vec3::ZERO }
+    Surface { albedo: albedo / coverage, coverage: coverage / count, ..Surface::default() }
 }
 
 #[test]
@@ -158,5 +158,6 @@ fn broken_images_become_white_and_a_note() {
 fn primitives_without_material_have_the_default_one() {
     let scene = Builder::new(&CORNERS).load().unwrap();
     assert_eq!(scene.materials.len(), 1);
-    assert_eq!(scene.mean_surface(0), Surface { albedo: Vec3::ONE, coverage: 1.0, emission: Vec3::ZERO });
+    let white = Surface { albedo: Vec3::ONE, painted: Vec3::ONE, coverage: 1.0, emission: Vec3::ZERO };
+    assert_eq!(scene.mean_surface(0), white);
 }
