@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant, SystemTime};
 
+use crate::inputs::{is_gltf, walk};
 use notify::{RecommendedWatcher, RecursiveMode, Watcher};
 
 /// File systems keep times to within this: two changes may have the same time if they are no farther apart. Two seconds on FAT.
@@ -59,11 +60,23 @@ pub struct Change {
     pub began: Instant,
 }
 
+/// A folder whose glTF files are followed, also those that are not there yet.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Tree {
+    /// The folder; what lies below it counts, but for what is hidden.
+    pub folder: PathBuf,
+    /// Folders that do not count.
+    pub except: Vec<PathBuf>,
+}
+
 /// Follows some files.
 pub struct Follower {
     options: FollowOptions,
     watch: Option<Watch>,
     files: BTreeMap<PathBuf, Known>,
+    trees: Vec<Tree>,
+    /// All folders of the trees.
+    folders: BTreeSet<PathBuf>,
     looked: Instant,
 }
 
@@ -97,7 +110,8 @@ impl Follower {
     /// [`FollowError`] if the system gives no events though they are asked for.
     pub fn new(options: FollowOptions) -> Result<Self, FollowError> {
         let watch = options.events.then(Watch::new).transpose()?;
-        Ok(Self { options, watch, files: BTreeMap::new(), looked: Instant::now() })
+        let (files, trees, folders) = Default::default();
+        Ok(Self { options, watch, files, trees, folders, looked: Instant::now() })
     }
 
     /// Follows these files from now on, and no others. They need not exist. A file that was followed before keeps what is known of it, so
@@ -112,7 +126,36 @@ impl Follower {
                 (file, known)
             })
             .collect();
+        for file in self.discover() {
+            // What nobody has heard of yet shows in the next look.
+            let known = before.get(&file).copied().unwrap_or(Known { stamp: None, content: None });
+            self.files.entry(file).or_insert(known);
+        }
         self.watch_folders();
+    }
+
+    /// Follows the glTF files below these folders from now on, too, those that come later as soon as they are there.
+    pub fn follow_trees(&mut self, trees: Vec<Tree>) {
+        self.trees = trees;
+        for file in self.discover() {
+            let known = Known::of(&file);
+            self.files.entry(file).or_insert(known);
+        }
+        self.watch_folders();
+    }
+
+    /// The glTF files below the trees; notes their folders.
+    fn discover(&mut self) -> Vec<PathBuf> {
+        let mut files = Vec::new();
+        self.folders.clear();
+        for entry in self.trees.iter().flat_map(|tree| walk(&tree.folder, tree.except.clone())) {
+            if entry.file_type().is_dir() {
+                self.folders.insert(entry.into_path());
+            } else if is_gltf(entry.path()) {
+                files.push(entry.into_path());
+            }
+        }
+        files
     }
 
     /// Waits for the next change; `None` if there is none in that time.
@@ -184,6 +227,11 @@ impl Follower {
     /// Looks at all files, and reads those that may have changed.
     fn look(&mut self) -> BTreeSet<PathBuf> {
         self.looked = Instant::now();
+        if !self.trees.is_empty() {
+            for file in self.discover() {
+                self.files.entry(file).or_insert(Known { stamp: None, content: None });
+            }
+        }
         self.watch_folders();
         let mut changed = BTreeSet::new();
         for (file, known) in &mut self.files {
@@ -202,7 +250,8 @@ impl Follower {
     /// Watches the folders of all files, those again that were replaced.
     fn watch_folders(&mut self) {
         if let Some(watch) = &mut self.watch {
-            watch.set(self.files.keys().flat_map(|file| folders_of(file)).collect());
+            let of_files = self.files.keys().flat_map(|file| folders_of(file));
+            watch.set(of_files.chain(self.folders.iter().cloned()).collect());
         }
     }
 }

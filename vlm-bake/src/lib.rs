@@ -57,4 +57,11 @@ pub mod picture;
 
 pub mod report_html;
 
+pub mod references;
 pub mod follow;
+pub mod settings;
+pub mod project;
+pub mod inputs;
+pub mod recipe;
+pub mod cache;
+pub mod job;

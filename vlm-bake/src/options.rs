@@ -1,5 +1,7 @@
 //! The knobs of a bake and their presets.
 
+use serde::{Deserialize, Serialize};
+
 use crate::flags::FlagError;
 use crate::grid::GridOptions;
 
@@ -28,7 +30,8 @@ pub struct BakeOptions {
 }
 
 /// Named sets of options.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Preset {
     /// A quick look: few lights, four samples each. The light of small objects blurs into that of their surroundings.
     Draft,

@@ -1,7 +1,8 @@
-//! references: what a file refers to, even if it is not valid: a watcher must see that the missing part arrives.
+//! What a file refers to, even if it is not valid: a watcher must see that the missing part arrives,
+//! and a cache that a part has changed.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use serde_json::Value;
 
@@ -13,9 +14,15 @@ pub fn references(path: &Path) -> Vec<PathBuf> {
     if let Some(json) = fs::read(path).ok().and_then(|bytes| json_of(&bytes)) {
         let lists = ["buffers", "images"].map(|name| json.get(name).and_then(Value::as_array));
         let uris = lists.into_iter().flatten().flatten().filter_map(|item| item.get("uri")?.as_str());
-        files.extend(uris.filter(|uri| !uri.starts_with("data:")).map(|uri| folder.join(decoded(uri))));
+        let paths = uris.filter(|uri| !uri.starts_with("data:")).map(decoded);
+        files.extend(paths.filter(|path| stays_inside(Path::new(path))).map(|path| folder.join(path)));
     }
     files
+}
+
+/// What leads out of the folder is refused by the format, so nobody waits for it.
+fn stays_inside(path: &Path) -> bool {
+    path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
 }
 
 /// The JSON of a .gltf file, or of a .glb file's first chunk.
@@ -51,7 +58,7 @@ mod tests {
         let path = folder.path().join("a.gltf");
         fs::write(
             &path,
-            r#"{"buffers":[{"uri":"a%20b.bin"},{"uri":"data:x"},{}],"images":[{"uri":"%zz.png"}]}"#,
+            r#"{"buffers":[{"uri":"a%20b.bin"},{"uri":"data:x"},{},{"uri":"../c.bin"}],"images":[{"uri":"%zz.png"},{"uri":"/d.png"}]}"#,
         )
         .unwrap();
         let names = |files: Vec<PathBuf>| -> Vec<String> {

@@ -7,7 +7,6 @@
 mod arguments;
 mod error;
 mod open;
-mod references;
 mod gpu;
 mod bindings;
 mod shaders;
@@ -41,7 +40,6 @@ pub use eye::{Eye, Flight};
 pub use gpu::Gpu;
 pub use headless::{Headless, ViewReport, headless, write_picture};
 pub use open::{LightGroup, OpenOptions, Opened};
-pub use references::references;
 pub use resolve::Screen;
 pub use session::{Look, Session};
 pub use shaders::Sources;

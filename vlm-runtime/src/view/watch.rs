@@ -8,10 +8,10 @@ use std::time::Duration;
 
 use vlm_bake::follow::{Change, FollowOptions, Follower};
 use vlm_bake::progress::Progress;
+use vlm_bake::references::references;
 
 use super::error::ViewError;
 use super::open::{OpenOptions, Opened};
-use super::references::references;
 
 /// So often the following thread looks whether it is still wanted.
 const LOOK_UP: Duration = Duration::from_millis(250);

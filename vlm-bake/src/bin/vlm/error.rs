@@ -4,6 +4,7 @@ use std::fmt;
 use std::process::ExitCode;
 
 use vlm_bake::camera::UnknownCamera;
+use vlm_bake::job::JobError;
 use vlm_bake::picture::PictureError;
 use vlm_bake::render::RenderError;
 use vlm_bake::scene;
@@ -59,6 +60,19 @@ impl From<scene::Error> for CliError {
         match error {
             scene::Error::File(error) => error.into(),
             _ => Self::Check(error.to_string()),
+        }
+    }
+}
+
+impl From<JobError> for CliError {
+    fn from(error: JobError) -> Self {
+        match error {
+            JobError::File(error) => error.into(),
+            JobError::Scene(error) => error.into(),
+            JobError::Bake { .. } => Self::Check(error.to_string()),
+            JobError::Cache(_) | JobError::OverSource { .. } | JobError::Unsteady { .. } => {
+                Self::Usage(error.to_string())
+            }
         }
     }
 }

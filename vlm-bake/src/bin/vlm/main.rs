@@ -8,7 +8,10 @@ mod geometry;
 mod input;
 mod output;
 mod progress;
+mod settings;
 mod bake;
+mod batch;
+mod watch;
 mod check;
 mod inspect;
 mod inspect_grid;
@@ -30,8 +33,10 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Bake Virtual Light Meshes into a glTF file
+    /// Bake Virtual Light Meshes into glTF files
     Bake(bake::BakeArgs),
+    /// Follow files, and bake those that change
+    Watch(watch::WatchArgs),
     /// Check that files are valid and that their Virtual Light Meshes still fit them
     Check(check::CheckArgs),
     /// Show what is in a file's Virtual Light Meshes
@@ -45,6 +50,7 @@ enum Command {
 fn main() -> ExitCode {
     let result: Result<(), CliError> = match Cli::parse().command {
         Command::Bake(args) => bake::run(&args),
+        Command::Watch(args) => watch::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Strip(args) => strip::run(&args),

@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::io::{ErrorKind, Write, stdout};
 use std::path::Path;
 
-use vlm_format::{Container, OutputFile, Target, write_atomic};
+use vlm_format::{Container, OutputFile, Target, write_atomic, write_file};
 
 use crate::error::CliError;
 use crate::input::is_pipe;
@@ -21,7 +21,7 @@ pub fn target(output: &Path) -> Result<Target, CliError> {
 }
 
 /// The folder of a path, `.` for a bare name.
-fn folder_of(path: &Path) -> &Path {
+pub fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
@@ -72,8 +72,24 @@ pub fn print(lines: &[impl Display]) -> Result<(), CliError> {
 /// # Errors
 /// As [`print()`].
 pub fn print_json(report: &impl serde::Serialize) -> Result<(), CliError> {
+    print(&[to_json(report)?])
+}
+
+/// A report as JSON.
+///
+/// # Errors
+/// If it cannot be JSON.
+pub fn to_json(report: &impl serde::Serialize) -> Result<String, CliError> {
     let json = serde_json::to_string_pretty(report);
-    print(&[json.map_err(|error| CliError::usage(format!("the report cannot be JSON: {error}")))?])
+    json.map_err(|error| CliError::usage(format!("the report cannot be JSON: {error}")))
+}
+
+/// Writes a report as JSON into a file.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write_json(path: &Path, report: &impl serde::Serialize) -> Result<(), CliError> {
+    Ok(write_file(path, (to_json(report)? + "\n").as_bytes())?)
 }
 
 fn pipe_broken(error: &std::io::Error) -> CliError {
