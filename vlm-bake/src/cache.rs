@@ -122,12 +122,16 @@ impl Cache {
         locked.map(Claim).map_err(|source| CacheError { path, action: "lock an entry", source })
     }
 
-    /// An entry that is whole as far as its list of files tells.
+    /// An entry that is whole as far as its list of files tells; one without a list is removed.
     #[must_use]
     pub fn entry(&self, key: &str) -> Option<Entry> {
         let folder = self.entry_folder(key);
-        let manifest: Manifest =
-            serde_json::from_slice(&fs::read(folder.join("manifest.json")).ok()?).ok()?;
+        let list = fs::read(folder.join("manifest.json"));
+        let Some(manifest) = list.ok().and_then(|list| serde_json::from_slice::<Manifest>(&list).ok()) else {
+            // Mostly it is not there.
+            let _ = fs::remove_dir_all(&folder);
+            return None;
+        };
         // Without its time the entry goes sooner than it should: no reason to fail.
         let _ = File::options()
             .write(true)

@@ -148,7 +148,7 @@ impl Follower {
     fn discover(&mut self) -> Vec<PathBuf> {
         let mut files = Vec::new();
         self.folders.clear();
-        for entry in self.trees.iter().flat_map(|tree| walk(&tree.folder, tree.except.clone())) {
+        for entry in self.trees.iter().flat_map(|tree| walk(&tree.folder, &tree.except)) {
             if entry.file_type().is_dir() {
                 self.folders.insert(entry.into_path());
             } else if is_gltf(entry.path()) {

@@ -107,8 +107,8 @@ fn before_wildcards(glob: &Path) -> PathBuf {
 
 /// The glTF files below a folder that are wanted, ascending.
 fn below(folder: &Path, except: &[&Path], wanted: impl Fn(&Path) -> bool) -> Vec<Input> {
-    let files = walk(folder, except.iter().map(|path| (*path).to_owned()).collect())
-        .filter(|entry| entry.file_type().is_file());
+    let except: Vec<PathBuf> = except.iter().map(|path| (*path).to_owned()).collect();
+    let files = walk(folder, &except).filter(|entry| entry.file_type().is_file());
     let input = |entry: DirEntry| {
         let path = if folder == Path::new(".") { without_dot(entry.path()) } else { entry.path().to_owned() };
         let relative = entry.path().strip_prefix(folder).ok()?.to_owned();
@@ -118,7 +118,7 @@ fn below(folder: &Path, except: &[&Path], wanted: impl Fn(&Path) -> bool) -> Vec
 }
 
 /// Everything below a folder, itself first, but for what is hidden, and the folders in `except`.
-pub(crate) fn walk(folder: &Path, except: Vec<PathBuf>) -> impl Iterator<Item = DirEntry> + use<> {
+pub(crate) fn walk(folder: &Path, except: &[PathBuf]) -> impl Iterator<Item = DirEntry> + use<> {
     let except: Vec<PathBuf> = except.iter().filter_map(|path| path.canonicalize().ok()).collect();
     let enters = move |entry: &DirEntry| {
         let is_hidden = entry.depth() > 0 && entry.file_name().as_encoded_bytes().starts_with(b".");

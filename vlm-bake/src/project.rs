@@ -110,7 +110,7 @@ impl Project {
             path: path.to_owned(),
             folder: path.parent().unwrap_or(Path::new("")).to_owned(),
             cache: cache.unwrap_or_default(),
-            settings: source.settings(Spanned::new(0..text.len(), table))?,
+            settings: source.settings(Spanned::new(0..text.len(), table), ", `files`, `cache`")?,
             rules: rules.unwrap_or_default(),
         })
     }
@@ -139,18 +139,29 @@ struct Source<'a> {
 
 impl Source<'_> {
     fn read<T: for<'de> Deserialize<'de>>(&self, value: Spanned<DeValue>) -> Result<T, ProjectError> {
+        self.read_beside(value, "")
+    }
+
+    /// Reads a value; `beside` are the names that may stand beside its own.
+    fn read_beside<T: for<'de> Deserialize<'de>>(
+        &self,
+        value: Spanned<DeValue>,
+        beside: &str,
+    ) -> Result<T, ProjectError> {
         let span = value.span();
         let refuse = |error: toml::de::Error| {
-            self.wrong(&error.span().unwrap_or(span.clone()), advise(error.message()))
+            let message = error.message();
+            let beside = if message.starts_with("unknown field") { beside } else { "" };
+            self.wrong(&error.span().unwrap_or(span.clone()), advise(&format!("{message}{beside}")))
         };
         T::deserialize(ValueDeserializer::from(value)).map_err(refuse)
     }
 
-    fn settings(&self, table: Spanned<DeTable>) -> Result<BakeSettings, ProjectError> {
+    fn settings(&self, table: Spanned<DeTable>, beside: &str) -> Result<BakeSettings, ProjectError> {
         let keys: Vec<_> = table.as_ref().keys().map(|key| (key.as_ref().to_string(), key.span())).collect();
         let span = table.span();
-        let settings: BakeSettings =
-            self.read(Spanned::new(span.clone(), DeValue::Table(table.into_inner())))?;
+        let table = Spanned::new(span.clone(), DeValue::Table(table.into_inner()));
+        let settings: BakeSettings = self.read_beside(table, beside)?;
         settings.check().map_err(|error| {
             let key = keys.iter().find(|(key, _)| key == error.key);
             self.wrong(key.map_or(&span, |(_, span)| span), error.to_string())
@@ -178,7 +189,7 @@ impl Source<'_> {
         let glob: String = self.read(glob)?;
         let glob = GlobBuilder::new(&glob).literal_separator(true).build();
         let glob = glob.map_err(|error| self.wrong(&place, error.to_string()))?;
-        Ok((glob.compile_matcher(), self.settings(Spanned::new(span, table))?))
+        Ok((glob.compile_matcher(), self.settings(Spanned::new(span, table), ", `glob`")?))
     }
 
     fn refuse(&self, error: &toml::de::Error) -> ProjectError {
@@ -243,6 +254,7 @@ mod tests {
             ("[[files]]\nglob = 'a'\nprest = 'game'\n", "3:1", "did you mean `preset`?"),
             ("lights = 0\n", "1:1", "from 1 to 1000000"),
             ("preset = 'gmae'\n", "1:1", "did you mean `game`?"),
+            ("[cahce]\nsize = 3\n", "1:2", "did you mean `cache`?"),
             ("[cache]\nsise = 3\n", "2:1", "did you mean `size`?"),
             ("lights = 'many'\n", "1:1", "expected u32"),
             ("[[files]]\nglob = 'a['\n", "2:8", "unclosed character class"),

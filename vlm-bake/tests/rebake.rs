@@ -50,7 +50,9 @@ const EDITS: &[Edit] = &[
     ("a volume", |scene, _| scene.volumes.push([DVec3::splat(0.2), DVec3::splat(0.8)]), LIGHTS),
     (
         "normals",
-        |scene, _| scene.vertex_normals.iter_mut().for_each(|n| *n = (*n + 0.1 * Vec3::X).normalize()),
+        |scene, _| {
+            scene.vertex_normals.iter_mut().for_each(|n| *n = (*n + 0.1 * Vec3::X).normalize_or_zero())
+        },
         LIGHTS,
     ),
     ("a place", |scene, _| moved(scene, Vec3::new(0.0, 0.01, 0.0)), NONE),

@@ -79,6 +79,20 @@ impl Target {
     }
 }
 
+/// Hexadecimal digits of the content in the names of files that the extension adds.
+const CONTENT_DIGITS: usize = 16;
+
+/// True for the name of a file that the extension added to a .gltf of that stem, whatever its content.
+pub(crate) fn is_data_of(stem: &str, name: &str) -> bool {
+    let digits = name
+        .strip_prefix(stem)
+        .and_then(|rest| rest.strip_prefix(".vlm."))
+        .and_then(|rest| rest.strip_suffix(".bin"));
+    digits.is_some_and(|digits| {
+        digits.len() == CONTENT_DIGITS && digits.bytes().all(|digit| digit.is_ascii_hexdigit())
+    })
+}
+
 /// A glTF file taken apart.
 #[derive(Clone, Debug)]
 pub(crate) struct Parts {
@@ -172,6 +186,14 @@ impl Parts {
         let uri = json!(percent_encode(&name));
         self.files.push(OutputFile { path: PathBuf::from(name), bytes, copied_from: None });
         uri
+    }
+
+    /// As [`Self::place`], but what the extension adds is named for its content: then a main file and its data belong together, though
+    /// they reach the disk one after the other.
+    pub(crate) fn place_by_content(&mut self, bytes: Vec<u8>, target: &Target) -> Value {
+        let hash = blake3::hash(&bytes).to_hex();
+        let digits = hash.as_str().get(..CONTENT_DIGITS).unwrap_or_default();
+        self.place(bytes, target, &format!("vlm.{digits}.bin"))
     }
 
     /// True if data can be appended to buffer 0 as the BIN chunk (or such a buffer can be made).

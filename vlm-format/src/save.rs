@@ -1,16 +1,18 @@
 //! Writes outputs to disk so that a reader sees all of a file or nothing of it.
 
+use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use crate::error::Error;
-use crate::package::OutputFile;
+use crate::package::{OutputFile, is_data_of};
 
 /// Writes the files of an output below `folder`, which must exist; folders inside it are made.
 ///
 /// Each is written beside its place under a temporary name, synchronised, and then renamed, the main file last, so that
-/// it never refers to what is not there yet. Files that already have the content are left alone. On failure no temporary
+/// it never refers to what is not there yet. Then data that an output of the same name left before is removed. Files that already have the
+/// content are left alone. On failure no temporary
 /// file is left, and files not yet renamed are as they were.
 ///
 /// # Errors
@@ -24,7 +26,25 @@ pub fn write_atomic(outputs: &[OutputFile], folder: &Path) -> Result<(), Error> 
             pending.push(Pending::write(&path, &output.bytes, folder)?);
         }
     }
-    pending.into_iter().try_for_each(Pending::rename)
+    pending.into_iter().try_for_each(Pending::rename)?;
+    remove_outdated(outputs, folder);
+    Ok(())
+}
+
+/// Removes the data that a former output of the same name left: its name tells its content, so it is another now.
+fn remove_outdated(outputs: &[OutputFile], folder: &Path) {
+    let Some(main) = outputs.first().map(|main| &main.path) else { return };
+    let is_gltf = main.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("gltf"));
+    let (true, Some(stem)) = (is_gltf, main.file_stem().and_then(OsStr::to_str)) else { return };
+    let home = main.parent().unwrap_or(Path::new(""));
+    for entry in fs::read_dir(folder.join(home)).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let is_data = name.to_str().is_some_and(|name| is_data_of(stem, name));
+        if is_data && outputs.iter().all(|output| output.path != home.join(&name)) {
+            // Nothing refers to it, so it does no harm where it cannot be removed.
+            let _ = fs::remove_file(entry.path());
+        }
+    }
 }
 
 /// Writes one file as [`write_atomic`] does.

@@ -322,7 +322,7 @@ fn append_to_bin(parts: &mut Parts, bytes: &[u8]) -> Place {
 fn add_buffer(parts: &mut Parts, bytes: Vec<u8>, target: &Target) -> Place {
     let buffer = array(&parts.json, "/buffers").len();
     let byte_length = bytes.len();
-    let uri = parts.place(bytes, target, "vlm.bin");
+    let uri = parts.place_by_content(bytes, target);
     push(&mut parts.json, "buffers", json!({ "byteLength": byte_length, "uri": uri }));
     Place { buffer, offset: 0, length_before: 0 }
 }

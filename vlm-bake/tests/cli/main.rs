@@ -5,6 +5,8 @@
 mod support;
 mod bad_input;
 mod baking;
+mod batch;
+mod watch;
 mod authored;
 mod commands;
 mod report_html;

@@ -9,7 +9,7 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::Value;
 use vlm_bake::cache::Cache;
-use vlm_bake::inputs::{Input, inputs};
+use vlm_bake::inputs::{Input, inputs, same_file};
 use vlm_bake::job::{self, Done, Effort, Job, JobError, Outcome};
 use vlm_bake::memory::Memory;
 use vlm_bake::progress::{Progress, Silent};
@@ -126,6 +126,13 @@ pub struct FileReport {
 /// If the inputs or the cache cannot be used, or anything failed that may not.
 pub fn run(asked: &Asked, args: &BatchArgs, fail_on_violation: bool) -> Result<(), CliError> {
     let begun = Instant::now();
+    if let Some(folder) = asked.inputs.iter().find(|input| input.is_dir() && same_file(input, asked.out_dir))
+    {
+        return Err(CliError::usage(format!(
+            "{}: the bakes would replace their sources; name another folder with --out-dir",
+            folder.display()
+        )));
+    }
     let wishes = asked.settings.wishes(common_folder(asked.inputs))?;
     let cache = args.cache.open(wishes.project.as_ref())?;
     let inputs =

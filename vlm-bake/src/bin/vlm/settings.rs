@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use vlm_bake::cache::{Cache, DEFAULT_SIZE};
 use vlm_bake::flags::positive;
 use vlm_bake::options::Preset;
-use vlm_bake::project::Project;
+use vlm_bake::project::{FILE_NAME, Project};
 use vlm_bake::settings::BakeSettings;
 
 use crate::error::CliError;
@@ -100,6 +100,17 @@ impl SettingsArgs {
         let project = path.map(|path| Project::read(&path)).transpose();
         let project = project.map_err(|error| CliError::usage(error.to_string()))?;
         Ok(Wishes { flags: self.flags(), project })
+    }
+
+    /// Where a project's file may come while there is none: in the inputs' folder, and in those above it that the user works in.
+    pub fn places_of_project(&self, folder: &Path) -> Vec<PathBuf> {
+        if self.no_config || self.config.is_some() {
+            return self.config.iter().cloned().collect();
+        }
+        let Ok(folder) = std::path::absolute(folder) else { return Vec::new() };
+        let here = std::env::current_dir().unwrap_or_default();
+        let above = folder.ancestors().skip(1).take_while(|above| above.starts_with(&here));
+        [folder.as_path()].into_iter().chain(above).map(|folder| folder.join(FILE_NAME)).collect()
     }
 
     fn flags(&self) -> BakeSettings {

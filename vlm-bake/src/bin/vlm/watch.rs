@@ -1,6 +1,6 @@
 //! `vlm watch`: bakes files whenever they, or what they refer to, change.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,8 +13,8 @@ use serde_json::Value;
 use vlm_bake::cache::Cache;
 use vlm_bake::flags::positive;
 use vlm_bake::follow::{Change, FollowOptions, Follower, Tree};
-use vlm_bake::inputs::inputs;
-use vlm_bake::job::{self, Effort, Job, JobError, Outcome};
+use vlm_bake::inputs::{inputs, is_gltf};
+use vlm_bake::job::{self, Done, Effort, Job, JobError, Outcome};
 use vlm_bake::memory::Memory;
 use vlm_bake::progress::Progress;
 use vlm_bake::references::references;
@@ -94,11 +94,12 @@ pub fn run(args: &WatchArgs) -> Result<(), CliError> {
     ctrlc::set_handler(move || handler.store(true, Ordering::Relaxed))
         .map_err(|error| CliError::usage(format!("Ctrl-C cannot be caught: {error}")))?;
     let mut watch = Watch::new(args, &over)?;
-    watch.begin()?;
+    let mut next = watch.begin()?;
     while !over.load(Ordering::Relaxed) {
-        if let Some(change) = watch.follower.wait(LOOK_UP) {
-            watch.answer(&change)?;
-        }
+        next = match next.or_else(|| watch.follower.wait(LOOK_UP)) {
+            Some(change) => watch.answer(&change)?,
+            None => None,
+        };
     }
     eprintln!("stopped");
     Ok(())
@@ -159,20 +160,20 @@ impl<'a> Watch<'a> {
         Ok(Self { args, over, follower, wishes, cache, memories: Mutex::default() })
     }
 
-    /// Follows everything, and bakes what is not up to date.
-    fn begin(&mut self) -> Result<(), CliError> {
+    /// Follows everything, and bakes what is not up to date; returns what changed meanwhile.
+    fn begin(&mut self) -> Result<Option<Change>, CliError> {
         let folders = self.args.paths.iter().filter(|path| path.is_dir());
         let except = vec![self.args.out_dir.clone()];
         let trees = folders.map(|folder| Tree { folder: folder.clone(), except: except.clone() });
         self.follower.follow_trees(trees.collect());
         let jobs = self.jobs().map_err(CliError::usage)?;
+        let files = jobs.len();
         self.follow(&jobs);
-        self.bake(jobs, Instant::now(), None)?;
+        let next = self.bake(jobs, Instant::now(), None)?;
         if !self.args.json {
-            let files = self.jobs().map_or(0, |jobs| jobs.len());
             eprintln!("watching  {files} files; Ctrl-C stops");
         }
-        Ok(())
+        Ok(next)
     }
 
     /// All files that are there now.
@@ -185,108 +186,133 @@ impl<'a> Watch<'a> {
     fn follow(&mut self, jobs: &[Job]) {
         let of_jobs = jobs.iter().flat_map(|job| references(&job.input));
         let named = self.args.paths.iter().filter(|path| !path.is_dir()).cloned();
-        self.follower.follow(of_jobs.chain(named).chain(self.project_file()));
+        self.follower.follow(of_jobs.chain(named).chain(self.project_files()));
     }
 
-    fn project_file(&self) -> Option<PathBuf> {
-        self.wishes.project.as_ref().map(|project| project.path.clone())
+    /// The project's file, or the places where one may come.
+    fn project_files(&self) -> Vec<PathBuf> {
+        match &self.wishes.project {
+            Some(project) => vec![project.path.clone()],
+            None => self.args.settings.places_of_project(common_folder(&self.args.paths)),
+        }
     }
 
-    /// Bakes what a change concerns.
-    fn answer(&mut self, change: &Change) -> Result<(), CliError> {
-        let files: BTreeSet<PathBuf> = change.files.iter().cloned().collect();
-        let mut all = false;
-        if self.project_file().is_some_and(|file| files.contains(&file)) {
+    /// Bakes what a change concerns; returns what changed meanwhile.
+    fn answer(&mut self, change: &Change) -> Result<Option<Change>, CliError> {
+        let is_of_all = self.project_files().iter().any(|file| change.files.contains(file));
+        if is_of_all {
             match self.args.settings.wishes(common_folder(&self.args.paths)) {
-                Ok(wishes) => (self.wishes, all) = (wishes, true),
+                Ok(wishes) => self.wishes = wishes,
                 Err(error) => eprintln!("error: {error}"),
             }
         }
         // A folder without files is no error: some may come.
         let jobs = self.jobs().unwrap_or_default();
-        self.say_gone(&jobs, &files)?;
+        self.say_gone(&jobs, change)?;
         self.follow(&jobs);
-        let concerned = |job: &Job| all || references(&job.input).iter().any(|file| files.contains(file));
-        self.bake(jobs.into_iter().filter(concerned).collect(), change.began, Some(change))
+        let concerned = jobs.into_iter().filter(|job| is_of_all || concerns(change, job));
+        self.bake(concerned.collect(), change.began, Some(change))
     }
 
-    /// Bakes some files; what fails is only said once it stays as it is.
-    fn bake(&mut self, jobs: Vec<Job>, began: Instant, change: Option<&Change>) -> Result<(), CliError> {
+    /// Bakes some files; what fails is only said once it stays as it is. Returns what changed meanwhile.
+    fn bake(
+        &mut self,
+        jobs: Vec<Job>,
+        began: Instant,
+        change: Option<&Change>,
+    ) -> Result<Option<Change>, CliError> {
         if jobs.is_empty() {
-            return Ok(());
+            return Ok(None);
         }
-        let outdated = AtomicBool::new(false);
-        let cancel = Cancel { over: self.over, outdated: &outdated };
-        let (args, cache, memories) = (self.args, self.cache.as_ref(), &self.memories);
-        let saved = saved_at(change);
-        let one = |job: &Job| {
-            let mut memory = memories.lock().map(|mut all| all.take(&job.input)).unwrap_or_default();
-            let result = job::run(job, cache, Effort::Bake, &mut memory, &cancel);
-            if let Ok(mut all) = memories.lock() {
-                all.keep(&job.input, memory);
-            }
-            let since = saved.and_then(|saved| SystemTime::now().duration_since(saved).ok());
-            let seconds = since.unwrap_or_else(|| began.elapsed()).as_secs_f64();
-            match result {
-                Ok(done) => say_done(args, job, &done, seconds).map(|()| None),
-                Err(error) => Ok(Some(error)),
-            }
-        };
-        let (results, news) = std::thread::scope(|scope| {
-            let baking = scope.spawn(|| in_parallel(&jobs, args.jobs, one));
-            let mut news: Option<Change> = None;
-            while !baking.is_finished() {
-                if let Some(change) = self.follower.wait(LOOK_UP) {
-                    let concerns =
-                        |job: &Job| references(&job.input).iter().any(|f| change.files.contains(f));
-                    outdated.fetch_or(jobs.iter().any(concerns), Ordering::Relaxed);
-                    let files = news.map_or_else(Vec::new, |news| news.files);
-                    news = Some(Change { files: [files, change.files].concat(), began: change.began });
-                }
-            }
-            (baking.join().unwrap_or_default(), news)
+        let clock = SaveClock { began, saved: saved_at(change) };
+        let (results, mut next) = self.bake_and_listen(&jobs, &clock);
+        let failed = jobs.iter().zip(results).filter_map(|(job, result)| match result {
+            Ok(()) => None,
+            Err(Failure::Job(error)) => Some(Ok((job, error))),
+            Err(Failure::Report(error)) => Some(Err(error)),
         });
-        let mut failed = Vec::new();
-        let mut cancelled = Vec::new();
-        for (job, result) in jobs.into_iter().zip(results) {
-            match result? {
-                Some(error) if error.is_cancelled() => cancelled.extend(references(&job.input)),
-                Some(error) => failed.push((job, error)),
-                None => {}
-            }
-        }
+        let failed = failed.collect::<Result<Vec<(&Job, JobError)>, CliError>>()?;
         if self.over.load(Ordering::Relaxed) {
-            return Ok(());
+            return Ok(None);
         }
-        let mut next = news;
+        let (cancelled, failed): (Vec<_>, Vec<_>) =
+            failed.into_iter().partition(|(_, error)| error.is_cancelled());
         if next.is_none() && !failed.is_empty() {
             next = self.follower.wait(SETTLES);
         }
-        if next.is_none() || !cancelled.is_empty() {
-            let files =
-                cancelled.into_iter().chain(next.into_iter().flat_map(|next| next.files)).collect::<Vec<_>>();
-            next = (!files.is_empty()).then_some(Change { files, began: Instant::now() });
+        for (job, error) in
+            failed.iter().filter(|(job, _)| next.as_ref().is_none_or(|next| !concerns(next, job)))
+        {
+            let event =
+                WatchEvent { error: Some(error.to_string()), ..WatchEvent::new(job, clock.seconds()) };
+            event.say(self.args.json)?;
         }
-        let is_asked_again = |job: &Job| {
-            next.as_ref()
-                .is_some_and(|next| references(&job.input).iter().any(|file| next.files.contains(file)))
-        };
-        for (job, error) in failed.iter().filter(|(job, _)| !is_asked_again(job)) {
-            say_failed(args, job, error, began.elapsed().as_secs_f64())?;
-        }
-        next.map_or(Ok(()), |next| self.answer(&next))
+        let again = cancelled.into_iter().map(|(job, _)| job.input.clone());
+        Ok(merged(next, again.collect()))
     }
 
-    /// Says which files are gone.
-    fn say_gone(&self, jobs: &[Job], files: &BTreeSet<PathBuf>) -> Result<(), CliError> {
-        let is_input = |file: &&PathBuf| vlm_bake::inputs::is_gltf(file) && !file.exists();
-        for file in files.iter().filter(is_input).filter(|file| jobs.iter().all(|job| job.input != **file)) {
-            if self.args.json {
-                continue;
+    /// Bakes on threads of their own, and ends that as soon as one of the files changes again. Returns what changed meanwhile.
+    fn bake_and_listen(
+        &mut self,
+        jobs: &[Job],
+        clock: &SaveClock,
+    ) -> (Vec<Result<(), Failure>>, Option<Change>) {
+        let outdated = AtomicBool::new(false);
+        let cancel = Cancel { over: self.over, outdated: &outdated };
+        let baker =
+            Baker { args: self.args, cache: self.cache.as_ref(), memories: &self.memories, cancel, clock };
+        let follower = &mut self.follower;
+        std::thread::scope(|scope| {
+            let baking = scope.spawn(|| in_parallel(jobs, baker.args.jobs, |job| baker.bake(job)));
+            let mut news: Option<Change> = None;
+            while !baking.is_finished() {
+                if let Some(change) = follower.wait(LOOK_UP) {
+                    outdated.fetch_or(jobs.iter().any(|job| concerns(&change, job)), Ordering::Relaxed);
+                    let began = change.began;
+                    news = merged(news, change.files).map(|news| Change { began, ..news });
+                }
             }
-            print(&[format!("gone        {}  (its last bake stays)", file.display())])?;
-        }
-        Ok(())
+            (baking.join().unwrap_or_default(), news)
+        })
+    }
+
+    /// Says which inputs are gone.
+    fn say_gone(&self, jobs: &[Job], change: &Change) -> Result<(), CliError> {
+        let is_gone =
+            |file: &&PathBuf| is_gltf(file) && !file.exists() && jobs.iter().all(|job| job.input != **file);
+        let lines: Vec<String> = change
+            .files
+            .iter()
+            .filter(is_gone)
+            .map(|file| format!("gone        {}  (its last bake stays)", file.display()))
+            .collect();
+        if self.args.json { Ok(()) } else { print(&lines) }
+    }
+}
+
+/// True if a job reads one of the files that changed.
+fn concerns(change: &Change, job: &Job) -> bool {
+    references(&job.input).iter().any(|file| change.files.contains(file))
+}
+
+/// More files that changed; `None` without any.
+fn merged(change: Option<Change>, more: Vec<PathBuf>) -> Option<Change> {
+    let began = change.as_ref().map_or_else(Instant::now, |change| change.began);
+    let mut files = change.map_or_else(Vec::new, |change| change.files);
+    files.extend(more);
+    (!files.is_empty()).then_some(Change { files, began })
+}
+
+/// Since when users wait.
+struct SaveClock {
+    began: Instant,
+    saved: Option<SystemTime>,
+}
+
+impl SaveClock {
+    fn seconds(&self) -> f64 {
+        let since = self.saved.and_then(|saved| SystemTime::now().duration_since(saved).ok());
+        since.unwrap_or_else(|| self.began.elapsed()).as_secs_f64()
     }
 }
 
@@ -297,25 +323,40 @@ fn saved_at(change: Option<&Change>) -> Option<SystemTime> {
     newest.elapsed().is_ok_and(|age| age < RECENT).then_some(newest)
 }
 
-fn say_done(args: &WatchArgs, job: &Job, done: &job::Done, seconds: f64) -> Result<(), CliError> {
-    let mut event = WatchEvent::new(job, seconds);
-    event.outcome = Some(done.outcome);
-    event.reasons.clone_from(&done.reasons);
-    if done.outcome == Outcome::Baked {
-        let of_report = |key: &str| done.report.get(key).cloned().unwrap_or(Value::Null);
-        event.stages = serde_json::from_value(of_report("seconds")).unwrap_or_default();
-        event.reused = serde_json::from_value(of_report("reused")).unwrap_or_default();
-    }
-    if done.outcome != Outcome::UpToDate {
-        event.say(args.json)?;
-        args.exec.as_ref().map_or(Ok(()), |command| execute(command, job))?;
-    }
-    Ok(())
+/// What bakes of one round share.
+struct Baker<'a> {
+    args: &'a WatchArgs,
+    cache: Option<&'a Cache>,
+    memories: &'a Mutex<Memories>,
+    cancel: Cancel<'a>,
+    clock: &'a SaveClock,
 }
 
-fn say_failed(args: &WatchArgs, job: &Job, error: &JobError, seconds: f64) -> Result<(), CliError> {
-    let event = WatchEvent { error: Some(error.to_string()), ..WatchEvent::new(job, seconds) };
-    event.say(args.json)
+/// Why a file has no new bake.
+enum Failure {
+    Job(JobError),
+    /// It has, but nobody could be told.
+    Report(CliError),
+}
+
+impl Baker<'_> {
+    fn bake(&self, job: &Job) -> Result<(), Failure> {
+        let mut memory = self.memories.lock().map(|mut all| all.take(&job.input)).unwrap_or_default();
+        let result = job::run(job, self.cache, Effort::Bake, &mut memory, &self.cancel);
+        if let Ok(mut all) = self.memories.lock() {
+            all.keep(&job.input, memory);
+        }
+        let done = result.map_err(Failure::Job)?;
+        if done.outcome == Outcome::UpToDate {
+            return Ok(());
+        }
+        let event = WatchEvent::new(job, self.clock.seconds()).of(&done);
+        event.say(self.args.json).map_err(Failure::Report)?;
+        if let Some(command) = &self.args.exec {
+            execute(command, job);
+        }
+        Ok(())
+    }
 }
 
 impl WatchEvent {
@@ -323,6 +364,17 @@ impl WatchEvent {
         let (input, output) = (job.input.clone(), job.output.clone());
         let (reasons, reused, stages) = Default::default();
         Self { input, output, outcome: None, seconds, reasons, stages, reused, error: None }
+    }
+
+    fn of(mut self, done: &Done) -> Self {
+        self.outcome = Some(done.outcome);
+        self.reasons.clone_from(&done.reasons);
+        if done.outcome == Outcome::Baked {
+            let of_report = |key: &str| done.report.get(key).cloned().unwrap_or(Value::Null);
+            self.stages = serde_json::from_value(of_report("seconds")).unwrap_or_default();
+            self.reused = serde_json::from_value(of_report("reused")).unwrap_or_default();
+        }
+        self
     }
 
     fn say(&self, json: bool) -> Result<(), CliError> {
@@ -349,17 +401,13 @@ impl WatchEvent {
 }
 
 /// Runs the user's command; that it fails is said, and no reason to stop.
-fn execute(command: &str, job: &Job) -> Result<(), CliError> {
+fn execute(command: &str, job: &Job) {
     let (shell, flag) = if cfg!(windows) { ("cmd", "/C") } else { ("sh", "-c") };
-    let status = Command::new(shell)
-        .args([flag, command])
-        .env("VLM_INPUT", &job.input)
-        .env("VLM_OUTPUT", &job.output)
-        .status();
-    match status {
+    let mut child = Command::new(shell);
+    child.args([flag, command]).env("VLM_INPUT", &job.input).env("VLM_OUTPUT", &job.output);
+    match child.status() {
         Ok(status) if status.success() => {}
         Ok(status) => eprintln!("exec      `{command}`: {status}"),
         Err(error) => eprintln!("exec      `{command}`: {error}"),
     }
-    Ok(())
 }
