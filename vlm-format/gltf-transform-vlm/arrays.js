@@ -35,6 +35,14 @@ export class ArrayReader {
     return new VirtualLightArray(this.document.getGraph()).setContent(def, rest, BufferUtils.toView(values).slice());
   }
 
+  /** Counts what lies in the buffer view of the arrays as read, so that nothing of a damaged extension stays behind. */
+  takeView(view) {
+    const { accessors = [], bufferViews = [] } = this.context.jsonDoc.json;
+    // Where another tool renumbered, the view is someone else's by now.
+    if (bufferViews[view]?.name !== NAME) return;
+    accessors.forEach((def, i) => def.bufferView === view && this.taken.add(this.context.accessors[i]));
+  }
+
   /** Removes the accessors that were read, and a buffer that was there for them alone, from the document: writing makes new ones. */
   release() {
     const isRoot = (property) => property.propertyType === "Root";

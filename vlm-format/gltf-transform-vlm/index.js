@@ -29,6 +29,7 @@ export class VLMVirtualLightMesh extends Extension {
         `${NAME}: left out: ${error.message}: another tool altered the file. Bake it again with \`vlm bake\`.`,
       );
       this.listProperties().forEach((property) => property.dispose());
+      reader.takeView(context.jsonDoc.json.extensions?.[NAME]?.data?.bufferView);
     }
     this.#readNodes(context);
     reader.release();
