@@ -9,3 +9,5 @@ mod authored;
 mod commands;
 mod report_html;
 mod geometry;
+mod generated;
+mod schemas;
