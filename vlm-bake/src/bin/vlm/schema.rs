@@ -13,12 +13,21 @@ use crate::error::CliError;
 use crate::inspect;
 use crate::output::{print, print_json};
 
-/// Every report in JSON: its name, which command makes it, and its schema. A new report is one more line.
-const REPORTS: &[(&str, &str, fn() -> Schema)] = &[
-    ("bake", "vlm bake --report FILE.json", schema_of::<Report>),
-    ("check", "vlm check --json", schema_of::<Vec<check::Finding>>),
-    ("inspect", "vlm inspect --json", schema_of::<inspect::Content>),
-    ("render", "vlm render --json", schema_of::<RenderReport>),
+/// A report in JSON.
+struct Kind {
+    /// What `vlm schema` knows it by.
+    name: &'static str,
+    /// The command that makes it.
+    command: &'static str,
+    schema: fn() -> Schema,
+}
+
+/// Every report in JSON. A new report is one more line here, and one in the tests that makes it.
+const REPORTS: &[Kind] = &[
+    Kind { name: "bake", command: "vlm bake --report FILE.json", schema: schema_of::<Report> },
+    Kind { name: "check", command: "vlm check --json", schema: schema_of::<Vec<check::Finding>> },
+    Kind { name: "inspect", command: "vlm inspect --json", schema: schema_of::<inspect::Content> },
+    Kind { name: "render", command: "vlm render --json", schema: schema_of::<RenderReport> },
 ];
 
 /// Flags of `vlm schema`.
@@ -34,16 +43,26 @@ pub struct SchemaArgs {
 /// If there is no report of that name.
 pub fn run(args: &SchemaArgs) -> Result<(), CliError> {
     let Some(name) = &args.name else {
-        let lines: Vec<String> =
-            REPORTS.iter().map(|(name, command, _)| format!("{name:<9} {command}")).collect();
-        return print(&lines);
+        let line = |kind: &Kind| format!("{:<9} {}", kind.name, kind.command);
+        return print(&REPORTS.iter().map(line).collect::<Vec<_>>());
     };
-    match REPORTS.iter().find(|(known, ..)| known == name) {
-        Some((name, command, schema)) => print_json(&named(name, command, schema())),
+    match REPORTS.iter().find(|kind| kind.name == name) {
+        Some(kind) => print_json(&kind.document()),
         None => {
-            let names: Vec<&str> = REPORTS.iter().map(|(name, ..)| *name).collect();
+            let names: Vec<&str> = REPORTS.iter().map(|kind| kind.name).collect();
             Err(CliError::usage(format!("`{name}` is no report; ask for one of {}", names.join(", "))))
         }
+    }
+}
+
+impl Kind {
+    /// The schema, named for the report in place of the type, which is no one else's business.
+    fn document(&self) -> Value {
+        let mut all = Map::new();
+        all.insert(String::from("$id"), json!(format!("{}.schema.json", self.name)));
+        all.extend((self.schema)().to_value().as_object().cloned().unwrap_or_default());
+        all.insert(String::from("title"), json!(format!("Report of {}", self.command)));
+        Value::Object(all)
     }
 }
 
@@ -63,13 +82,4 @@ fn close(schema: &mut Schema) {
     if closes {
         schema.insert(String::from("additionalProperties"), Value::Bool(false));
     }
-}
-
-/// Says which report it is of, in place of the type's name, which is no one else's business.
-fn named(name: &str, command: &str, schema: Schema) -> Value {
-    let mut all = Map::new();
-    all.insert(String::from("$id"), json!(format!("{name}.schema.json")));
-    all.extend(schema.to_value().as_object().cloned().unwrap_or_default());
-    all.insert(String::from("title"), json!(format!("Report of {command}")));
-    Value::Object(all)
 }
