@@ -49,6 +49,9 @@ const STEPS = {
   "moved.glb": byTransform((document) => {
     document.getRoot().listNodes().find((node) => node.getMesh()).setTranslation([0, 0.25, 0]);
   }),
+  "undrawn.glb": byTransform((document) => {
+    document.getRoot().listNodes().find((node) => node.getMesh()).setMesh(null);
+  }, prune()),
   "simplify.glb": byTransform(weld(), simplify({ simplifier, ratio: 0.25, error: 0.05 })),
   "quantize.glb": byTransform(quantize()),
   "join.glb": byTransform(flatten(), join(), prune()),

@@ -131,7 +131,9 @@ fn other_tools_do_to_the_extension_what_the_table_says() {
     let folder = folder();
     bake("cornell.glb", folder.path(), "baked.glb");
     assert_eq!(check(folder.path(), "baked.glb"), None);
+    let config = "--config node_modules/gltf-transform-vlm/gltf-transform.config.mjs";
     for (line, code) in [
+        (format!("gltf-transform draco baked.glb out.glb {config}").as_str(), "DRACO"),
         ("gltf-transform copy baked.glb out.glb", "NO_VLM"),
         ("gltfpack -i baked.glb -o out.glb", "NO_VLM"),
         ("gltfpack -i baked.glb -o out.glb -c", "NO_VLM"),
