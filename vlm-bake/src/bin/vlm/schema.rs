@@ -8,10 +8,12 @@ use serde_json::{Map, Value, json};
 use vlm_bake::render::RenderReport;
 use vlm_bake::report::Report;
 
+use crate::batch;
 use crate::check;
 use crate::error::CliError;
 use crate::inspect;
 use crate::output::{print, print_json};
+use crate::watch;
 
 /// A report in JSON.
 struct Kind {
@@ -25,6 +27,12 @@ struct Kind {
 /// Every report in JSON. A new report is one more line here, and one in the tests that makes it.
 const REPORTS: &[Kind] = &[
     Kind { name: "bake", command: "vlm bake --report FILE.json", schema: schema_of::<Report> },
+    Kind {
+        name: "batch",
+        command: "vlm bake --out-dir DIR, with --json or --report FILE.json",
+        schema: schema_of::<batch::BatchReport>,
+    },
+    Kind { name: "watch", command: "vlm watch --json, each line", schema: schema_of::<watch::WatchEvent> },
     Kind { name: "check", command: "vlm check --json", schema: schema_of::<Vec<check::Finding>> },
     Kind { name: "inspect", command: "vlm inspect --json", schema: schema_of::<inspect::Content> },
     Kind { name: "render", command: "vlm render --json", schema: schema_of::<RenderReport> },
