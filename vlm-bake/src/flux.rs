@@ -10,6 +10,7 @@
 use std::f32::consts::PI;
 
 use glam::{DVec3, Vec3};
+use schemars::JsonSchema;
 use serde::Serialize;
 use vlm_shaders::cpu::resolve::luminance;
 
@@ -30,7 +31,7 @@ const MOST_GROWTH: f64 = 1.1;
 pub const TOLERANCE: f64 = 0.02;
 
 /// The light that an object sends out, as the report shows it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ObjectFlux {
     /// Node path.
     pub object: String,

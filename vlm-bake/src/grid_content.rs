@@ -1,10 +1,11 @@
 //! A static grid in numbers, as `vlm inspect` and the report's page show it.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vlm_format::{GltfFile, Grid, Leaf};
 
 /// A grid in numbers.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct GridContent {
     /// Edge of a cell of the coarsest level, metres.
     pub cell_size_m: f32,
@@ -43,7 +44,7 @@ pub struct GridContent {
 }
 
 /// An array of the grid, by its name in the file.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ArrayBytes {
     /// The name.
     pub array: &'static str,
@@ -54,7 +55,7 @@ pub struct ArrayBytes {
 }
 
 /// How many things have `from` to `to` of something, both included.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Bin {
     /// The least.
     pub from: usize,

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use glam::{DMat4, Vec3};
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 use vlm_format::{Grid, VlmAsset};
 use vlm_shaders::cpu::gather::{Gathered, Receiver, gather_together};
@@ -90,7 +91,7 @@ pub struct Rendering {
 }
 
 /// A finished picture in numbers, as `--json` prints it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct RenderReport {
     /// The camera's name.
     pub camera: String,
@@ -106,7 +107,7 @@ pub struct RenderReport {
 }
 
 /// What a picture took.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct RenderStats {
     /// Wall time of the two phases.
     pub seconds: PhaseSeconds,
@@ -117,7 +118,7 @@ pub struct RenderStats {
 }
 
 /// Wall time, seconds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct PhaseSeconds {
     /// Phase 1: direct light at the samples.
     pub inject: f64,

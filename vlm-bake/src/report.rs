@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::flux::ObjectFlux;
@@ -9,7 +10,7 @@ use crate::tag::TagReport;
 use crate::verify::ClearanceReport;
 
 /// The report of one bake.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Report {
     /// Triangles of the visible scene.
     pub visible_triangles: usize,
@@ -48,7 +49,7 @@ pub struct Report {
 }
 
 /// Decimation in figures.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct DecimationReport {
     /// Faces asked for.
     pub asked: usize,
@@ -63,7 +64,7 @@ pub struct DecimationReport {
 }
 
 /// The offset in figures.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct OffsetReport {
     /// Mean over the vertices, metres.
     pub mean_m: f64,
@@ -72,7 +73,7 @@ pub struct OffsetReport {
 }
 
 /// Areas in figures.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct AreaReport {
     /// Area of the surface that reflects or emits, square metres.
     pub visible_m2: f64,
@@ -87,7 +88,7 @@ pub struct AreaReport {
 }
 
 /// The grid in figures.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct GridReport {
     /// Cells that list probes.
     pub leaves: usize,

@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 
 use petgraph::unionfind::UnionFind;
 use rustc_hash::FxHashMap;
+use schemars::JsonSchema;
 use serde::Serialize;
 use vlm_format::TriangleTags;
 
@@ -18,7 +19,7 @@ use crate::scene::Scene;
 use crate::topology::area;
 
 /// Why a tag was given.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TagReason {
     /// The artist asked for it.
@@ -41,7 +42,7 @@ pub struct Accusation {
 }
 
 /// One tag, as the report shows it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct TagReport {
     /// The id.
     pub tag: u32,

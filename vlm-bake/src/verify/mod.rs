@@ -10,6 +10,7 @@ mod self_light;
 use glam::{DMat4, DVec3};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
+use schemars::JsonSchema;
 use serde::Serialize;
 use vlm_format::VlmAsset;
 use vlm_shaders::cpu::upload::world_corners;
@@ -90,7 +91,7 @@ pub struct Finding {
 }
 
 /// The result of the check, as the report shows it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct ClearanceReport {
     /// Surface points checked.
     pub samples: u64,

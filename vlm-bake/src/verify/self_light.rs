@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 use vlm_shaders::cpu::form_factor::{LightGeometry, form_factor};
 
@@ -13,7 +14,7 @@ const MEAN_OVER: usize = 256;
 
 /// The light that a surface gets from its own lights, each at unit radiosity, relative to the mean irradiance that all lights
 /// give, unoccluded.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct SelfLight {
     /// What 999 of 1,000 points do not exceed.
     pub p999: f64,

@@ -11,3 +11,5 @@ mod authored;
 mod commands;
 mod report_html;
 mod geometry;
+mod generated;
+mod schemas;

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use clap::Args;
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 use vlm_bake::cache::Cache;
@@ -75,7 +76,7 @@ pub struct Asked<'a> {
 }
 
 /// What a batch did.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct BatchReport {
     /// Files looked at.
     pub inputs: usize,
@@ -102,7 +103,7 @@ pub struct BatchReport {
 }
 
 /// What became of one file.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct FileReport {
     /// The glTF file.
     pub input: PathBuf,
@@ -117,6 +118,7 @@ pub struct FileReport {
     /// Seconds.
     pub seconds: f64,
     /// The report of its bake, also where the cache had it; null where there is none.
+    #[schemars(with = "Option<vlm_bake::report::Report>")]
     pub report: Value,
 }
 

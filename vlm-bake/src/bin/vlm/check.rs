@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Value, json};
 use vlm_bake::scene::Scene;
@@ -28,18 +29,34 @@ pub struct CheckArgs {
 }
 
 /// What was found in one file.
-#[derive(Serialize)]
-struct Finding {
+#[derive(Serialize, JsonSchema)]
+pub struct Finding {
     file: String,
     ok: bool,
     lights: usize,
     /// `{ code, severity, pointer, message }` each.
+    #[schemars(with = "Vec<IssueShape>")]
     issues: Vec<Value>,
     /// One line with remedy that sums the issues up; empty if there are none.
     summary: String,
     /// The proof that the lights lie behind their surface, where it was asked for and could be had.
     #[serde(skip_serializing_if = "Option::is_none")]
     geometry: Option<Proof>,
+}
+
+/// The shape of an issue in the report.
+#[derive(JsonSchema)]
+#[schemars(rename = "Issue")]
+#[expect(dead_code, reason = "only its schema is used")]
+struct IssueShape {
+    /// Which rule was broken, such as `STALE` or `NO_VLM`.
+    code: String,
+    /// `error` or `warning`.
+    severity: String,
+    /// JSON pointer, or the id of the VLM.
+    pointer: String,
+    /// What is wrong there.
+    message: String,
 }
 
 /// Runs the command.

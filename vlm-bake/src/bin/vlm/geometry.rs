@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Value, json};
 use vlm_bake::scene::{LoadOptions, Scene, load};
@@ -15,7 +16,7 @@ use crate::input::open;
 const SPELT_OUT: usize = 10;
 
 /// The proof of one file.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Proof {
     /// The proof in figures.
     #[serde(flatten)]

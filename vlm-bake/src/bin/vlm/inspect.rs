@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use glam::Vec3;
+use schemars::JsonSchema;
 use serde::Serialize;
 use vlm_bake::grid_content::GridContent;
 use vlm_format::{GltfFile, Settings, VlmAsset, read_vlm_unchecked};
@@ -25,10 +26,11 @@ pub struct InspectArgs {
 }
 
 /// The content of an asset in numbers.
-#[derive(Serialize)]
-struct Content {
+#[derive(Serialize, JsonSchema)]
+pub struct Content {
     file: String,
     generator: String,
+    #[schemars(with = "SettingsShape")]
     settings: Settings,
     vlms: Vec<VlmContent>,
     lights: usize,
@@ -49,13 +51,27 @@ struct Content {
     grid: Option<GridContent>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct VlmContent {
     id: String,
     node: u32,
     lights: u32,
     vertices: u32,
     authored: bool,
+}
+
+/// The shape of [`Settings`], whose crate knows no schemas: games link it.
+#[derive(JsonSchema)]
+#[schemars(rename = "Settings", rename_all = "camelCase")]
+#[expect(dead_code, reason = "only its schema is used")]
+struct SettingsShape {
+    preset: String,
+    lights: u32,
+    cell_size: f32,
+    probes: u32,
+    rays: u32,
+    near: u32,
+    samples: u32,
 }
 
 /// Runs the command. Stale files may be looked into; that is what `vlm check` is for.

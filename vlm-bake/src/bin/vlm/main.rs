@@ -17,6 +17,9 @@ mod inspect;
 mod inspect_grid;
 mod strip;
 mod render;
+mod schema;
+mod completions;
+mod man;
 
 use std::process::ExitCode;
 
@@ -25,7 +28,7 @@ use clap::{Parser, Subcommand};
 use error::CliError;
 
 #[derive(Parser)]
-#[command(version, about = "Bakes Virtual Light Meshes into glTF files, and shows their light")]
+#[command(name = "vlm", version, about = "Bakes Virtual Light Meshes into glTF files, and shows their light")]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -45,6 +48,12 @@ enum Command {
     Strip(strip::StripArgs),
     /// Render a picture on the CPU
     Render(render::RenderArgs),
+    /// Print the JSON Schema of a report, or list those that there are
+    Schema(schema::SchemaArgs),
+    /// Print a script that completes commands and flags in a shell
+    Completions(completions::CompletionsArgs),
+    /// Write manual pages, one for each command
+    Man(man::ManArgs),
 }
 
 fn main() -> ExitCode {
@@ -55,6 +64,9 @@ fn main() -> ExitCode {
         Command::Inspect(args) => inspect::run(&args),
         Command::Strip(args) => strip::run(&args),
         Command::Render(args) => render::run(&args),
+        Command::Schema(args) => schema::run(&args),
+        Command::Completions(args) => completions::run(&args),
+        Command::Man(args) => man::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -59,9 +59,17 @@ pub fn deliver(output: &Path, files: &[OutputFile]) -> Result<(), CliError> {
 /// # Errors
 /// If stdout cannot be written for another reason.
 pub fn print(lines: &[impl Display]) -> Result<(), CliError> {
+    let lines: String = lines.iter().map(|line| format!("{line}\n")).collect();
+    print_bytes(lines.as_bytes())
+}
+
+/// Prints text that is already in lines, as [`print()`] does.
+///
+/// # Errors
+/// As [`print()`].
+pub fn print_bytes(text: &[u8]) -> Result<(), CliError> {
     let mut pipe = stdout().lock();
-    let printed = lines.iter().try_for_each(|line| writeln!(pipe, "{line}")).and_then(|()| pipe.flush());
-    match printed {
+    match pipe.write_all(text).and_then(|()| pipe.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(pipe_broken(&error)),
         _ => Ok(()),
     }

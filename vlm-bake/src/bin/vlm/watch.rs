@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant, SystemTime};
 
 use clap::Args;
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 use vlm_bake::cache::Cache;
@@ -64,7 +65,7 @@ pub struct WatchArgs {
 }
 
 /// What happened to one file.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct WatchEvent {
     /// The glTF file.
     pub input: PathBuf,
