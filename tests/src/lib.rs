@@ -33,6 +33,7 @@ pub mod hard_meshes;
 pub mod text;
 pub mod grid_bench;
 pub mod bake_bench;
+pub mod rebuild_bench;
 pub mod breakdown;
 pub mod clearance_bench;
 pub mod shadow_bench;

@@ -63,3 +63,30 @@ fn a_missing_output_folder_is_named() {
         assert!(error.contains(part), "`{part}` is missing in: {error}");
     }
 }
+
+/// Those of programs that still run stay; which those are only Linux tells at once.
+#[test]
+#[cfg(target_os = "linux")]
+fn what_killed_programs_left_goes() {
+    let folder = tempfile::tempdir().unwrap();
+    let gone = format!(".a.glb.{}-0.tmp", u32::MAX);
+    let ours = format!(".a.glb.{}-7.tmp", std::process::id());
+    for name in [&gone, &ours, ".b.glb.4294967295-0.tmp", ".a.glb.tmp"] {
+        fs::write(folder.path().join(name), "half").unwrap();
+    }
+    write_atomic(&[output("a.glb", "whole")], folder.path()).unwrap();
+    assert_eq!(names(folder.path()), [&ours, ".a.glb.tmp", ".b.glb.4294967295-0.tmp", "a.glb"]);
+}
+
+/// A main file and the data named for its content belong together, whatever a former output left.
+#[test]
+fn data_of_a_former_output_goes_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = |digit: &str| format!("a.vlm.{}.bin", digit.repeat(16));
+    for name in [data("1").as_str(), "a.vlm.bin", "a.vlm.12.bin", "b.vlm.1111111111111111.bin", "a.bin"] {
+        fs::write(folder.path().join(name), "data").unwrap();
+    }
+    write_atomic(&[output("a.gltf", "json"), output(&data("2"), "new")], folder.path()).unwrap();
+    let left = ["a.bin", "a.gltf", &data("2"), "a.vlm.12.bin", "a.vlm.bin", "b.vlm.1111111111111111.bin"];
+    assert_eq!(names(folder.path()), left);
+}

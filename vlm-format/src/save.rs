@@ -4,6 +4,7 @@ use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use crate::error::Error;
 use crate::package::{OutputFile, is_data_of};
@@ -82,6 +83,7 @@ impl Pending {
         if let Some(parent) = path.parent() {
             fs::create_dir_all(parent).map_err(io)?;
         }
+        remove_abandoned(path);
         let (temporary, mut file) = create_beside(path).map_err(io)?;
         let pending = Self { temporary, path: path.to_owned(), renamed: false };
         file.write_all(bytes).and_then(|()| file.sync_all()).map_err(io)?;
@@ -106,6 +108,34 @@ impl Drop for Pending {
             let _ = fs::remove_file(&self.temporary);
         }
     }
+}
+
+/// A temporary file older than this belongs to nobody: writing one takes seconds.
+const ABANDONED: Duration = Duration::from_secs(3600);
+
+/// Removes temporary files that programs left which were killed while they wrote this one.
+fn remove_abandoned(path: &Path) {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let Some(folder) = path.parent() else { return };
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let found = entry.file_name();
+        let id = found.to_str().and_then(|found| {
+            let rest = found.strip_prefix('.')?.strip_prefix(&*name)?.strip_prefix('.')?;
+            rest.strip_suffix(".tmp")?.split_once('-')?.0.parse::<u32>().ok()
+        });
+        let age = || entry.metadata().ok()?.modified().ok()?.elapsed().ok();
+        if id.is_some_and(|id| is_gone(id) || age().is_some_and(|age| age > ABANDONED)) {
+            // Somebody else may have been faster.
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// True if this machine tells which processes run, and the one of this id does not.
+fn is_gone(process: u32) -> bool {
+    let processes = Path::new("/proc");
+    processes.join("self").exists() && !processes.join(process.to_string()).exists()
 }
 
 /// A new file in the same folder, so that renaming cannot cross file systems.

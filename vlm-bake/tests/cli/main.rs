@@ -7,6 +7,7 @@ mod bad_input;
 mod baking;
 mod batch;
 mod watch;
+mod kill;
 mod authored;
 mod commands;
 mod report_html;

@@ -5,8 +5,9 @@ use std::io::{Read, stdin};
 use std::path::{Path, PathBuf};
 
 use glam::Vec3;
-use vlm_bake::bake::bake;
+use vlm_bake::bake::rebake;
 use vlm_bake::bvh::{Bvh, FlatBvh};
+use vlm_bake::memory::Memory;
 use vlm_bake::options::{BakeOptions, Preset};
 use vlm_bake::progress::Progress;
 use vlm_bake::render::{triangle_tags, world_lights};
@@ -74,12 +75,25 @@ impl Opened {
     /// # Errors
     /// Where the file cannot be read or holds no scene, where its lights do not fit it, or it has none and none can be made.
     pub fn open(path: &Path, options: OpenOptions, progress: &dyn Progress) -> Result<Self, ViewError> {
+        Self::open_again(path, options, &mut Memory::default(), progress)
+    }
+
+    /// Opens as [`Opened::open`] does; where the file is baked, that goes by what `memory` holds of its last bake.
+    ///
+    /// # Errors
+    /// As [`Opened::open`].
+    pub fn open_again(
+        path: &Path,
+        options: OpenOptions,
+        memory: &mut Memory,
+        progress: &dyn Progress,
+    ) -> Result<Self, ViewError> {
         progress.begin("read", 1);
         let file = read(path)?;
         let name = file.name().to_owned();
         let mut scene = load(&file, &LoadOptions::default())?;
         let (asset, is_baked) = if options.needs_lights {
-            let (asset, is_baked) = lights(&file, &scene, options.preset, progress)?;
+            let (asset, is_baked) = lights(&file, &scene, options.preset, memory, progress)?;
             (Some(asset), is_baked)
         } else {
             (None, false)
@@ -118,6 +132,7 @@ fn lights(
     file: &GltfFile,
     scene: &Scene,
     preset: Preset,
+    memory: &mut Memory,
     progress: &dyn Progress,
 ) -> Result<(VlmAsset, bool), ViewError> {
     let name = || file.name().to_owned();
@@ -125,7 +140,7 @@ fn lights(
         (asset, false)
     } else {
         let options = BakeOptions::preset(preset, scene.triangles.len());
-        let baked = bake(scene, &options, progress);
+        let baked = rebake(scene, &options, memory, progress);
         (baked.map_err(|source| ViewError::Bake { file: name(), source })?.asset, true)
     };
     // As `vlm render` refuses lights of nodes without geometry.

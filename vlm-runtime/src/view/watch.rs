@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use vlm_bake::follow::{Change, FollowOptions, Follower};
+use vlm_bake::memory::Memory;
 use vlm_bake::progress::Progress;
 use vlm_bake::references::references;
 
@@ -143,11 +144,11 @@ fn open_when_asked(
     shared: &Shared,
     (asked, tell): (&Receiver<u64>, &Sender<News>),
 ) {
-    let mut was_opened = false;
+    let (mut was_opened, mut memory) = (false, Memory::default());
     while let Ok(first) = asked.recv() {
         let generation = asked.try_iter().last().unwrap_or(first);
         let opening = Opening { shared, generation };
-        let opened = Opened::open(file, options, &opening);
+        let opened = Opened::open_again(file, options, &mut memory, &opening);
         shared.show_stage(None);
         if opening.is_cancelled() {
             continue;

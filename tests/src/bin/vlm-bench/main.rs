@@ -5,6 +5,7 @@ mod report;
 mod pareto;
 mod grid;
 mod bake;
+mod rebuild;
 mod breakdown;
 mod clearance;
 mod shadows;
@@ -35,6 +36,8 @@ enum Command {
     Grid(grid::GridArgs),
     /// Seconds of each bake stage and peak memory against triangles, beside gltfpack
     Bake(bake::BakeArgs),
+    /// From a change to the written file: batches that are baked already, and edits under a watch
+    Rebuild(rebuild::RebuildArgs),
     /// One bake, in the process whose memory `bake` measures
     #[command(hide = true)]
     BakeChild(bake::ChildArgs),
@@ -59,6 +62,7 @@ fn main() -> ExitCode {
         Command::Report(args) => report::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Grid(args) => grid::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Bake(args) => bake::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Rebuild(args) => rebuild::run(&args).map(|()| ExitCode::SUCCESS),
         Command::BakeChild(args) => bake::run_child(&args).map(|()| ExitCode::SUCCESS),
         Command::Breakdown(args) => breakdown::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Clearance(args) => clearance::run(&args).map(|()| ExitCode::SUCCESS),
