@@ -1,6 +1,9 @@
 //! Takes the extension out of a file again.
 
-use serde_json::{Map, Value};
+use std::collections::BTreeSet;
+
+use serde::Deserialize;
+use serde_json::Value;
 
 use crate::check::{array, count, index, layout};
 use crate::package::Parts;
@@ -8,37 +11,67 @@ use crate::package::Parts;
 /// The name of the extension.
 pub const EXTENSION: &str = "VLM_virtual_light_mesh";
 
-/// Removes all that writing added: extension objects, and the accessors, buffer view and data behind them.
+/// Removes all that writing added: extension objects, and the accessors, buffer view and data behind them. Returns the root object.
 ///
-/// What is left equals the file before writing, with two exceptions: an `extensions` object that was empty is gone, and
-/// where another tool appended to the file after us, the accessors and data stay, unused.
-pub(crate) fn strip(parts: &mut Parts) {
-    let Some(extension) = remove_extension(&mut parts.json) else { return };
-    for pointer in ["/nodes", "/meshes"] {
-        each(&mut parts.json, pointer, |item| {
-            remove_extension(item);
-            each(item, "/primitives", |primitive| drop(remove_extension(primitive)));
-        });
-    }
-    if let Some(Value::Array(used)) = parts.json.get_mut("extensionsUsed") {
+/// What is left equals the file before writing, with one exception: where another tool appended to the file after us, the accessors and
+/// data stay, unused.
+pub(crate) fn strip(parts: &mut Parts) -> Option<Removed> {
+    let empty = parts.json.pointer(&format!("/extensions/{EXTENSION}/data/{EMPTY}"));
+    let empty: BTreeSet<String> = empty.and_then(|list| BTreeSet::deserialize(list).ok()).unwrap_or_default();
+    let root = remove_extension(&mut parts.json, "", &empty);
+    each(&mut parts.json, "/nodes", "", |item, place| drop(remove_extension(item, place, &empty)));
+    each(&mut parts.json, "/meshes", "", |mesh, place| {
+        each(mesh, "/primitives", place, |item, place| drop(remove_extension(item, place, &empty)));
+    });
+    if let Some(Value::Array(used)) = parts.json.get_mut("extensionsUsed")
+        && used.iter().any(|name| name == EXTENSION)
+    {
         used.retain(|name| name != EXTENSION);
+        remove_if_empty(&mut parts.json, "", "extensionsUsed", &empty);
     }
-    remove_if_empty(&mut parts.json, "extensionsUsed");
-    remove_data(&extension, parts);
+    let removed = root.map(|root| Removed { with_data: remove_data(&root, parts, &empty).is_some(), root });
+    parts.settle();
+    removed
+}
+
+/// The property of `data` with the pointers of what was there before writing, and empty: else stripping would remove it.
+pub(crate) const EMPTY: &str = "emptyBefore";
+
+/// Pointers of the empty lists and objects that writing may add to.
+pub(crate) fn empty_places(root: &mut Value) -> Vec<String> {
+    let mut places = Vec::new();
+    let mut note = |item: &Value, place: &str, keys: &[&str]| {
+        let empty = |key: &&&str| item.get(key).is_some_and(is_empty);
+        places.extend(keys.iter().filter(empty).map(|key| format!("{place}/{key}")));
+    };
+    note(root, "", &["extensions", "extensionsUsed", "accessors", "bufferViews", "buffers"]);
+    each(root, "/nodes", "", |item, place| note(item, place, &["extensions"]));
+    each(root, "/meshes", "", |mesh, place| {
+        each(mesh, "/primitives", place, |item, place| note(item, place, &["extensions"]));
+    });
+    places
+}
+
+/// What was taken out.
+pub(crate) struct Removed {
+    /// The extension's object in the root.
+    pub root: Value,
+    /// False if accessors or data stayed, because they are no longer where writing put them.
+    pub with_data: bool,
 }
 
 /// Removes the extension's object, and `extensions` if nothing else is in it.
-fn remove_extension(item: &mut Value) -> Option<Value> {
+fn remove_extension(item: &mut Value, place: &str, empty: &BTreeSet<String>) -> Option<Value> {
     let extensions = item.get_mut("extensions")?.as_object_mut()?;
     let extension = extensions.shift_remove(EXTENSION)?;
-    remove_if_empty(item, "extensions");
+    remove_if_empty(item, place, "extensions", empty);
     Some(extension)
 }
 
 /// Removes accessors, buffer view and bytes, if they are still where writing put them.
 ///
 /// Another tool may have renumbered what the extension names, so nothing is removed that could be anyone else's.
-fn remove_data(extension: &Value, parts: &mut Parts) -> Option<()> {
+fn remove_data(extension: &Value, parts: &mut Parts, empty: &BTreeSet<String>) -> Option<()> {
     let data = extension.get("data")?;
     let (view, before) = (index(data, "bufferView")?, count(data, "bufferByteLength")?);
     let (json, others) = array(&parts.json, "/bufferViews").split_last()?;
@@ -52,9 +85,10 @@ fn remove_data(extension: &Value, parts: &mut Parts) -> Option<()> {
     let (buffer, offset) = (index(json, "buffer")?, count(json, "byteOffset").unwrap_or(0));
     let is_tail = others.iter().all(|other| end_in(other, buffer) <= offset);
     let kept = accessors.len() - ours;
-    truncate(&mut parts.json, "accessors", kept);
-    truncate(&mut parts.json, "bufferViews", view);
-    if is_tail { shrink_buffer(buffer, usize::try_from(offset).ok()?, before, parts) } else { None }
+    truncate(&mut parts.json, "accessors", kept, empty);
+    truncate(&mut parts.json, "bufferViews", view, empty);
+    let offset = usize::try_from(offset).ok()?;
+    if is_tail { shrink_buffer(buffer, offset, before, parts, empty) } else { None }
 }
 
 /// Where the last byte that a buffer view needs of a buffer ends.
@@ -68,18 +102,24 @@ fn end_in(view: &Value, buffer: usize) -> u64 {
 }
 
 /// Gives the BIN chunk its former length, or removes a buffer that was made for the extension.
-fn shrink_buffer(buffer: usize, offset: usize, before: u64, parts: &mut Parts) -> Option<()> {
+fn shrink_buffer(
+    buffer: usize,
+    offset: usize,
+    before: u64,
+    parts: &mut Parts,
+    empty: &BTreeSet<String>,
+) -> Option<()> {
     let buffers = array(&parts.json, "/buffers").len();
     let json = parts.json.pointer_mut(&format!("/buffers/{buffer}"))?;
     let uri = json.get("uri").and_then(Value::as_str).map(str::to_owned);
     match uri {
         Some(uri) if before == 0 && buffer + 1 == buffers => {
             parts.drop_file(&uri);
-            truncate(&mut parts.json, "buffers", buffer);
+            truncate(&mut parts.json, "buffers", buffer, empty);
         }
         None if buffer == 0 => {
             if before == 0 {
-                truncate(&mut parts.json, "buffers", 0);
+                truncate(&mut parts.json, "buffers", 0, empty);
             } else {
                 json["byteLength"] = before.into();
             }
@@ -91,26 +131,33 @@ fn shrink_buffer(buffer: usize, offset: usize, before: u64, parts: &mut Parts) -
     Some(())
 }
 
-fn truncate(json: &mut Value, key: &str, length: usize) {
+fn truncate(json: &mut Value, key: &str, length: usize, empty: &BTreeSet<String>) {
     if let Some(Value::Array(list)) = json.get_mut(key) {
         list.truncate(length);
     }
-    remove_if_empty(json, key);
+    remove_if_empty(json, "", key, empty);
 }
 
-fn remove_if_empty(json: &mut Value, key: &str) {
+/// Removes what is empty now and was not there before.
+fn remove_if_empty(json: &mut Value, place: &str, key: &str, empty: &BTreeSet<String>) {
     let Value::Object(object) = json else { return };
-    let empty = match object.get(key) {
-        Some(Value::Array(list)) => list.is_empty(),
-        Some(Value::Object(map)) => Map::is_empty(map),
-        _ => false,
-    };
-    if empty {
+    if object.get(key).is_some_and(is_empty) && !empty.contains(&format!("{place}/{key}")) {
         object.shift_remove(key);
     }
 }
 
-fn each(json: &mut Value, pointer: &str, mut change: impl FnMut(&mut Value)) {
-    let items = json.pointer_mut(pointer).and_then(Value::as_array_mut);
-    items.into_iter().flatten().for_each(&mut change);
+fn is_empty(value: &Value) -> bool {
+    match value {
+        Value::Array(list) => list.is_empty(),
+        Value::Object(map) => map.is_empty(),
+        _ => false,
+    }
+}
+
+/// Visits the items of a list, with the pointer of each.
+fn each(json: &mut Value, list: &str, place: &str, mut visit: impl FnMut(&mut Value, &str)) {
+    let items = json.pointer_mut(list).and_then(Value::as_array_mut);
+    for (i, item) in items.into_iter().flatten().enumerate() {
+        visit(item, &format!("{place}{list}/{i}"));
+    }
 }

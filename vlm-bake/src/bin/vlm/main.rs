@@ -4,8 +4,11 @@
 //! 2 it could not run.
 
 mod error;
-mod geometry;
 mod input;
+mod files;
+mod problem;
+mod geometry;
+mod sarif;
 mod output;
 mod progress;
 mod settings;
@@ -16,6 +19,7 @@ mod check;
 mod inspect;
 mod inspect_grid;
 mod strip;
+mod relink;
 mod render;
 mod schema;
 mod completions;
@@ -46,6 +50,8 @@ enum Command {
     Inspect(inspect::InspectArgs),
     /// Take the Virtual Light Meshes out of a file
     Strip(strip::StripArgs),
+    /// Attach Virtual Light Meshes again that another tool dropped or renumbered
+    Relink(relink::RelinkArgs),
     /// Render a picture on the CPU
     Render(render::RenderArgs),
     /// Print the JSON Schema of a report, or list those that there are
@@ -63,6 +69,7 @@ fn main() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Strip(args) => strip::run(&args),
+        Command::Relink(args) => relink::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Schema(args) => schema::run(&args),
         Command::Completions(args) => completions::run(&args),
