@@ -287,5 +287,5 @@ fn the_corpus_comes_back() {
     }
     let same = outcomes.get("same bytes").map_or(0, Vec::len);
     let all: usize = outcomes.values().map(Vec::len).sum();
-    assert!(same >= 180 && same * 100 >= all * 95, "{same} of {all} come back byte by byte");
+    assert!(same >= 170 && same * 100 >= all * 98, "{same} of {all} come back byte by byte");
 }

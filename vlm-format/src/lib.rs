@@ -23,6 +23,8 @@ mod tags;
 mod validate;
 mod nodes;
 mod digest;
+mod place;
+mod recover;
 mod read;
 mod patch;
 mod strip;
@@ -30,6 +32,7 @@ mod package;
 mod write;
 mod relink;
 mod sidecar;
+mod sizes;
 mod save;
 
 pub use asset::{Sample, Settings, Vlm, VlmAsset};
@@ -41,12 +44,10 @@ pub use read::{read_vlm, read_vlm_recovered, read_vlm_unchecked};
 pub use relink::{Donor, RelinkOptions, Relinked, relink};
 pub use save::{write_atomic, write_file};
 pub use sidecar::write_sidecar;
-pub use strip::EXTENSION;
+pub use strip::{Difference, EXTENSION, Stripped, strip_vlm, strip_vlm_compared};
 pub use tags::TriangleTags;
 pub use validate::{MAX_ASPECT_RATIO, validate};
-pub use write::{
-    Difference, Stripped, WriteOptions, strip_vlm, strip_vlm_compared, write_vlm, write_vlm_with,
-};
+pub use write::{WriteOptions, write_vlm, write_vlm_with};
 
 /// Compiles the code of the README.
 #[cfg(doctest)]

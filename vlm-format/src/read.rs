@@ -1,7 +1,5 @@
 //! Reads a [`VlmAsset`] out of a glTF file and says when it no longer fits the file around it.
 
-use std::collections::HashMap;
-
 use glam::Vec3;
 use serde_json::Value;
 
@@ -13,6 +11,8 @@ use crate::digest::{self, Source};
 use crate::error::{Error, Issue, Stale};
 use crate::grid::Grid;
 use crate::nodes;
+use crate::place;
+use crate::recover::Arrays;
 use crate::strip::EXTENSION;
 use crate::tags::{TriangleTags, elements};
 use crate::validate::validate_in;
@@ -71,7 +71,10 @@ fn read(file: &GltfFile, trust: Trust) -> Result<Option<VlmAsset>, Error> {
     }
     match validate_in(file, &asset) {
         issues if issues.is_empty() => Ok(Some(asset)),
-        issues => Err(Error::Invalid { file: file.name().to_owned(), issues }),
+        issues => {
+            let issues = issues.into_iter().map(place::in_file).collect();
+            Err(Error::Invalid { file: file.name().to_owned(), issues })
+        }
     }
 }
 
@@ -108,55 +111,6 @@ struct Reader<'a> {
     /// Bytes of the buffer view that no array has claimed yet. No array of ours overlaps another: else a small file could name a large
     /// accessor again and again.
     unclaimed: usize,
-}
-
-/// Accessors by the digest of what they hold.
-#[derive(Default)]
-struct Arrays {
-    plain: HashMap<String, usize>,
-    /// Those of unsigned bytes, which compressed arrays are stored in.
-    bytes: Vec<usize>,
-}
-
-impl Arrays {
-    /// All accessors that could be an array's. What cannot be read is none.
-    fn of(file: &GltfFile) -> Self {
-        let mut arrays = Self::default();
-        for (accessor, json) in array(file.json(), "/accessors").iter().enumerate() {
-            let kind = json.get("type").and_then(Value::as_str).unwrap_or_default();
-            let bytes = match (kind, count(json, "componentType")) {
-                ("SCALAR", Some(5121)) => {
-                    arrays.bytes.push(accessor);
-                    continue;
-                }
-                ("SCALAR" | "VEC3" | "VEC4", Some(5126)) => file.read_floats(accessor).map(words),
-                ("SCALAR", Some(5125)) => file.read_u32(accessor).map(words),
-                _ => continue,
-            };
-            if let Ok(bytes) = bytes {
-                arrays.plain.entry(digest::of_array(kind, &bytes)).or_insert(accessor);
-            }
-        }
-        arrays
-    }
-
-    fn compressed(&self, file: &GltfFile, codec: &Value, kind: &str, digest: &str) -> Option<usize> {
-        let (_, components) = layout::columns_and_rows(kind);
-        let codec = Codec::read(codec, components * size_of::<u32>() as u64, "").ok()?;
-        let holds = |accessor: usize| {
-            let json = array(file.json(), "/accessors").get(accessor)?;
-            count(json, "count").filter(|&count| count == codec.byte_length)?;
-            let bytes = codec.decode(&file.read_bytes(accessor).ok()?, "").ok()?;
-            (digest::of_array(kind, &bytes) == digest).then_some(accessor)
-        };
-        self.bytes.iter().copied().find_map(holds)
-    }
-}
-
-/// Little-endian bytes.
-fn words<T: bytemuck::Pod>(values: Vec<T>) -> Vec<u8> {
-    let words: &[u32] = bytemuck::cast_slice(&values);
-    words.iter().copied().flat_map(u32::to_le_bytes).collect()
 }
 
 /// An array of the extension.
@@ -314,11 +268,7 @@ impl<'a> Reader<'a> {
             return named;
         }
         let digest = digest::text(json, "digest");
-        let found = match json.get(compress::PROPERTY) {
-            None => self.arrays.plain.get(digest).copied(),
-            Some(codec) => self.arrays.compressed(self.file, codec, kind, digest),
-        };
-        found.unwrap_or(named)
+        self.arrays.find(self.file, json.get(compress::PROPERTY), kind, digest).unwrap_or(named)
     }
 
     /// Takes bytes of the buffer view for one array; false if so many are not left.

@@ -13,7 +13,7 @@ use crate::digest::{self, Source};
 use crate::error::Error;
 use crate::grid::Grid;
 use crate::package::{OutputFile, Parts, Target};
-use crate::strip::{EMPTY, EXTENSION, empty_places, strip};
+use crate::strip::{EMPTY, EXTENSION, empty_places, source_digest, strip};
 use crate::validate::validate_in;
 
 /// How [`write_vlm_with`] stores an asset.
@@ -63,83 +63,11 @@ pub fn write_vlm_with(
     parts.pack(target)
 }
 
-/// A file without its Virtual Light Meshes.
-#[derive(Clone, Debug)]
-pub struct Stripped {
-    /// The files of the output, the main one first.
-    pub files: Vec<OutputFile>,
-    /// Why the main file's bytes are not those that were baked; `None` if they are, or if the file had no Virtual Light Mesh.
-    pub difference: Option<Difference>,
-}
-
-/// Why a stripped file is not, byte by byte, what was baked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Difference {
-    /// The output is a .gltf and the input a .glb, or the other way round.
-    #[error("it is in another container than the input; name the output as the input")]
-    Container,
-    /// Another tool renumbered or appended.
-    #[error(
-        "another tool changed the file after the bake, so the accessors and bytes of the lights stay in it, unused"
-    )]
-    DataStays,
-    /// The bytes are not those that the file's digest is of.
-    #[error("it was baked from a file in another container, or another tool changed it after the bake")]
-    Rewritten,
-    /// The file has no digest of its source.
-    #[error(
-        "the file does not say what it was baked from: by another tool, or from a GLB with bytes that belong to no chunk"
-    )]
-    Unknown,
-}
-
-/// Takes the Virtual Light Meshes out of a file, which is then as it was before [`write_vlm`]: byte by byte, where it is written into the
-/// container that it was in, and no other tool changed it since.
-///
-/// # Errors
-/// [`Error::Invalid`] if the output would be too large.
-pub fn strip_vlm(file: &GltfFile, target: &Target) -> Result<Vec<OutputFile>, Error> {
-    Ok(strip_vlm_compared(file, target)?.files)
-}
-
-/// Takes the Virtual Light Meshes out of a file as [`strip_vlm`] does, and tells whether its bytes are those that were baked.
-///
-/// # Errors
-/// As [`strip_vlm`].
-pub fn strip_vlm_compared(file: &GltfFile, target: &Target) -> Result<Stripped, Error> {
-    let mut parts = Parts::of(file);
-    let removed = strip(&mut parts);
-    let converted = *file.kind() != target.kind();
-    parts.convert(file, target);
-    let files = parts.pack(target)?;
-    let difference = removed.and_then(|removed| {
-        let known = removed.root.pointer("/data/sourceDigest").and_then(Value::as_str);
-        let found = files.first().map(|main| digest::of_array(FILE, &main.bytes));
-        match known {
-            Some(known) if found.as_deref() == Some(known) => None,
-            _ if converted => Some(Difference::Container),
-            _ if !removed.with_data => Some(Difference::DataStays),
-            Some(_) => Some(Difference::Rewritten),
-            None => Some(Difference::Unknown),
-        }
-    });
-    Ok(Stripped { files, difference })
-}
-
 /// What stripping has to know of the file before writing.
 struct Traces {
     source_digest: Option<String>,
     /// Pointers of lists and objects that were there, and empty.
     empty: Vec<String>,
-}
-
-/// What the digest of a whole file is marked with.
-const FILE: &str = "file";
-
-/// The digest of the main file without Virtual Light Meshes; `None` if stripping could not give back its bytes.
-fn source_digest(file: &GltfFile, stripped: &Parts, had_vlms: bool) -> Option<String> {
-    let bytes = stripped.main_bytes()?;
-    (had_vlms || bytes.len() == file.main_bytes()).then(|| digest::of_array(FILE, &bytes))
 }
 
 /// The arrays of an asset on their way into one buffer view.

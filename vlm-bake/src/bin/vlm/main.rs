@@ -17,7 +17,9 @@ mod batch;
 mod watch;
 mod check;
 mod inspect;
+mod inspect_bytes;
 mod inspect_grid;
+mod diff;
 mod strip;
 mod relink;
 mod render;
@@ -48,6 +50,8 @@ enum Command {
     Check(check::CheckArgs),
     /// Show what is in a file's Virtual Light Meshes
     Inspect(inspect::InspectArgs),
+    /// Tell what changed between two bakes
+    Diff(diff::DiffArgs),
     /// Take the Virtual Light Meshes out of a file
     Strip(strip::StripArgs),
     /// Attach Virtual Light Meshes again that another tool dropped or renumbered
@@ -68,6 +72,7 @@ fn main() -> ExitCode {
         Command::Watch(args) => watch::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Diff(args) => diff::run(&args),
         Command::Strip(args) => strip::run(&args),
         Command::Relink(args) => relink::run(&args),
         Command::Render(args) => render::run(&args),
@@ -77,6 +82,7 @@ fn main() -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
+        Err(CliError::Quiet) => CliError::Quiet.exit_code(),
         Err(error) => {
             eprintln!("error: {error}");
             error.exit_code()

@@ -73,7 +73,13 @@ fn recover(file: &GltfFile) -> Result<Relinked, CliError> {
         let message = "the file has no Virtual Light Mesh; name the file that was baked with --from";
         CliError::from(Issue::error(Code::NoVlm, "/extensions", message).in_file(file.name()))
     };
-    let asset = read_vlm_recovered(file)?.ok_or_else(missing)?;
+    let lost = |error: vlm_format::Error| match error {
+        vlm_format::Error::Stale { .. } => {
+            CliError::Check(format!("{error}; or name the file that was baked, or its sidecar, with --from"))
+        }
+        other => other.into(),
+    };
+    let asset = read_vlm_recovered(file).map_err(lost)?.ok_or_else(missing)?;
     Ok(Relinked { asset, renamed: Vec::new(), changed: Vec::new() })
 }
 
