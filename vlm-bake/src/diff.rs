@@ -15,7 +15,10 @@ use crate::grid_content::GridContent;
 
 /// Lights whose centroids lie farther apart than this times the root of an average light's area are not the same. Higher values call more
 /// lights moved that are new; lower ones call those new that moved.
-const SAME_LIGHT: f64 = 2.0;
+const SAME_LIGHT: f64 = 0.5;
+
+/// Reflectance of a light that differs by less is the same: the sum over its samples rounds.
+const SAME_REFLECTANCE: f64 = 1e-5;
 
 /// Virtual Light Meshes with what the diff needs of their file.
 #[derive(Clone, Debug)]
@@ -77,7 +80,7 @@ pub struct ObjectDiff {
     pub emission: Amount,
     /// Lights of another tag.
     pub retagged: u32,
-    /// Lights whose samples lie elsewhere.
+    /// Lights whose samples lie elsewhere, or share the light's reflectance otherwise.
     pub resampled: u32,
     /// True if it became authored, or is no longer.
     pub authored: bool,
@@ -169,6 +172,10 @@ impl<'a> Light<'a> {
         self.samples.iter().map(|sample| sample.reflectance).sum()
     }
 
+    fn places(&self) -> Vec<(Vec3, Vec3)> {
+        self.samples.iter().map(|sample| (sample.position, sample.normal)).collect()
+    }
+
     fn key(&self) -> [u32; 9] {
         let numbers = self.corners.map(|corner| corner.to_array().map(f32::to_bits));
         std::array::from_fn(|i| numbers[i / 3][i % 3])
@@ -257,19 +264,20 @@ fn object(path: &str, id: &str, a: &[Light<'_>], b: &[Light<'_>]) -> ObjectDiff 
         removed: a.len() as u32 - matched,
         moved: amount(|a, b| a.centroid.distance(b.centroid) * b.scale),
         reshaped: count(|a, b| a.corners != b.corners && a.centroid == b.centroid),
-        recoloured: amount(|a, b| {
-            largest(a.albedo - b.albedo).max(largest(a.reflectance() - b.reflectance()))
-        }),
+        recoloured: amount(recoloured),
         emission: amount(|a, b| largest(a.emission - b.emission)),
         retagged: count(|a, b| a.tag != b.tag),
         resampled: count(|a, b| {
-            let places =
-                |light: &Light<'_>| light.samples.iter().map(|s| (s.position, s.normal)).collect::<Vec<_>>();
-            places(a) != places(b)
+            a.samples != b.samples && (a.places() != b.places() || recoloured(a, b) == 0.0)
         }),
         reordered: pairs.len() == a.len() && pairs.iter().any(|(i, j)| i != j),
         ..ObjectDiff::default()
     }
+}
+
+fn recoloured(a: &Light<'_>, b: &Light<'_>) -> f64 {
+    let reflectance = largest(a.reflectance() - b.reflectance());
+    largest(a.albedo - b.albedo).max(if reflectance < SAME_REFLECTANCE { 0.0 } else { reflectance })
 }
 
 fn largest(difference: Vec3) -> f64 {

@@ -15,6 +15,8 @@ fn json_of(output: &Output) -> Value {
 
 fn schema() -> jsonschema::Validator {
     let text = fs::read_to_string(repository("tests/expected/sarif-2.1.0.schema.json")).unwrap();
+    // The published schema has a bracket too many in the pattern of languages.
+    let text = text.replace("[a-zA-Z]{2}]?$", "[a-zA-Z]{2}$");
     jsonschema::validator_for(&serde_json::from_str(&text).unwrap()).unwrap()
 }
 

@@ -167,7 +167,9 @@ fn tags(tags: &TagsDiff) -> Option<String> {
 fn power(reflected: &Change<[f64; 3]>) -> String {
     let mean = |rgb: &[f64; 3]| rgb.iter().sum::<f64>() / 3.0;
     let (from, to) = (mean(&reflected.from), mean(&reflected.to));
-    let share = if from > 0.0 { format!(" ({:+.2} %)", 100.0 * (to / from - 1.0)) } else { String::new() };
+    let percent = 100.0 * (to / from.max(f64::MIN_POSITIVE) - 1.0);
+    let share =
+        if percent.abs() < 0.005 { String::from(", the same") } else { format!(" ({percent:+.2} %)") };
     format!("power     the lights reflect as {from:.3} m2 of white, now {to:.3}{share}")
 }
 

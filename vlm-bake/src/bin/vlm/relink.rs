@@ -3,9 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use vlm_bake::scene::{LoadOptions, load};
+use glam::Vec3;
+use vlm_bake::bvh::Bvh;
+use vlm_bake::scene::{LoadOptions, Scene, load};
 use vlm_format::{
-    Code, Donor, GltfFile, Issue, RelinkOptions, Relinked, WriteOptions, read_vlm_recovered, relink,
+    Code, Donor, GltfFile, Issue, RelinkOptions, Relinked, Sample, WriteOptions, read_vlm_recovered, relink,
     write_vlm_with,
 };
 
@@ -25,7 +27,7 @@ pub struct RelinkArgs {
     /// Where the Virtual Light Meshes are: the file as it was baked, or its sidecar [default: in the input itself, with renumbered accessors]
     #[arg(long, visible_alias = "sidecar", value_name = "BAKED|SIDECAR")]
     from: Option<PathBuf>,
-    /// Also where geometry or colours of an object changed, if its lights still lie behind its surface
+    /// Also where geometry or colours of an object changed, if its lights and samples still lie behind and on its surface
     #[arg(long, requires = "from")]
     force: bool,
     /// Compress the lights and the grid, as `vlm bake --compress` does
@@ -63,8 +65,42 @@ fn attach(file: &GltfFile, from: &Path, force: bool) -> Result<Relinked, CliErro
         if let Some(summary) = proof.summary(file.name()) {
             return Err(CliError::Check(summary));
         }
+        samples_lie_on(&scene, &found).map_err(|issue| CliError::check(file.name(), issue))?;
     }
     Ok(found)
+}
+
+/// How far samples may lie from a surface that changed, as a share of their extent: more than quantisation to 14 bits moves it, and less than
+/// anyone sees. Higher values attach lights to another shape.
+const ON_SURFACE: f32 = 1e-3;
+
+/// The proof sees lights that would light their surface. Whether there still is a surface for them, their samples tell.
+fn samples_lie_on(scene: &Scene, found: &Relinked) -> Result<(), Issue> {
+    let bvh = Bvh::new(&scene.positions, &scene.triangles);
+    let changed = scene.objects.iter().filter(|object| found.changed.contains(&object.path));
+    for object in changed {
+        for vlm in found.asset.vlms.iter().filter(|vlm| vlm.node == object.node) {
+            let starts = [vlm.lights[0], vlm.lights[0] + vlm.lights[1]]
+                .map(|light| found.asset.sample_starts[light as usize] as usize);
+            let samples = &found.asset.samples[starts[0]..starts[1]];
+            let world = |sample: &Sample| object.world_from_node.transform_point3(sample.position.as_dvec3());
+            let points: Vec<Vec3> = samples.iter().map(|sample| world(sample).as_vec3()).collect();
+            let (least, most) = points
+                .iter()
+                .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(least, most), &p| (least.min(p), most.max(p)));
+            let reach = ON_SURFACE * most.distance(least);
+            let lost = points.iter().filter(|&&p| bvh.closest(p, reach, |_| true).is_none()).count();
+            if lost > 0 {
+                let message = format!(
+                    "`{}` changed: {lost} of {} samples of its lights no longer lie on a surface",
+                    object.path,
+                    points.len()
+                );
+                return Err(Issue::error(Code::Stale, format!("/nodes/{}", object.node), message));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The Virtual Light Meshes of the file itself, wherever its arrays are now.
