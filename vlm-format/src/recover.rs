@@ -28,8 +28,10 @@ impl Arrays {
                     arrays.bytes.push(accessor);
                     continue;
                 }
-                ("SCALAR" | "VEC3" | "VEC4", Some(5126)) => file.read_floats(accessor).map(words),
-                ("SCALAR", Some(5125)) => file.read_u32(accessor).map(words),
+                ("SCALAR" | "VEC3" | "VEC4", Some(5126)) => {
+                    file.read_floats(accessor).map(|values| words(&values))
+                }
+                ("SCALAR", Some(5125)) => file.read_u32(accessor).map(|values| words(&values)),
                 _ => continue,
             };
             if let Ok(bytes) = bytes {
@@ -67,7 +69,7 @@ impl Arrays {
 }
 
 /// Little-endian bytes.
-fn words<T: bytemuck::Pod>(values: Vec<T>) -> Vec<u8> {
-    let words: &[u32] = bytemuck::cast_slice(&values);
+fn words<T: bytemuck::Pod>(values: &[T]) -> Vec<u8> {
+    let words: &[u32] = bytemuck::cast_slice(values);
     words.iter().copied().flat_map(u32::to_le_bytes).collect()
 }

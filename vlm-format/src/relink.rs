@@ -242,7 +242,8 @@ impl Relinker<'_> {
                 self.outdated(vlm, pointer, format!("geometry or colours of `{path}` changed"));
             }
             None => {
-                self.outdated(vlm, "/nodes", format!("no object has the geometry of `{path}`, nor its path"))
+                let reason = format!("no object has the geometry of `{path}`, nor its path");
+                self.outdated(vlm, "/nodes", reason);
             }
         }
         node
@@ -264,7 +265,8 @@ impl Relinker<'_> {
                 // Those that bear lights have been named.
                 None if bears(old.node) => {}
                 None => {
-                    reasons.push((String::from("/nodes"), format!("`{}` was removed or changed", old.path)))
+                    let reason = format!("`{}` was removed or changed", old.path);
+                    reasons.push((String::from("/nodes"), reason));
                 }
             }
         }

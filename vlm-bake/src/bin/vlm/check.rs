@@ -22,7 +22,7 @@ const SPELT_OUT: usize = 10;
 /// Flags of `vlm check`.
 #[derive(Args)]
 pub struct CheckArgs {
-    /// glTF files, folders (every .glb and .gltf below them), or - for standard input (.glb)
+    /// glTF files, folders (every .glb and .gltf below them), globs, or - for standard input (.glb)
     #[arg(required = true, value_name = "FILE|FOLDER")]
     paths: Vec<PathBuf>,
     /// Also prove that the lights lie behind the surface of this file, from which they were baked

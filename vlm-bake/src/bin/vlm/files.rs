@@ -1,52 +1,24 @@
-//! Inputs by file or folder.
+//! What `vlm check` checks: files, the glTF files below folders, and those that globs match.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+
+use vlm_bake::inputs::{InputsError, inputs};
 
 use crate::error::CliError;
 
-/// The glTF files that paths stand for: a file for itself, a folder for every .glb and .gltf below it, sorted by path. Links to folders are
-/// not followed: they may lead in circles.
+/// The files that names stand for, those of a folder sorted. What is not there stays in the list: it is to be reported as one file among
+/// others.
 ///
 /// # Errors
-/// If a folder cannot be read, or holds no glTF file: a check of nothing would pass.
-pub fn gltf_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CliError> {
+/// If a folder or glob holds no glTF file: a check of nothing would pass.
+pub fn gltf_files(names: &[PathBuf]) -> Result<Vec<PathBuf>, CliError> {
     let mut files = Vec::new();
-    for path in paths {
-        if !path.is_dir() {
-            files.push(path.clone());
-            continue;
+    for name in names {
+        match inputs(std::slice::from_ref(name), &[]) {
+            Ok(found) => files.extend(found.into_iter().map(|input| input.path)),
+            Err(InputsError::Missing { .. }) => files.push(name.clone()),
+            Err(error) => return Err(CliError::usage(error.to_string())),
         }
-        let before = files.len();
-        collect(path, &mut files)?;
-        if files.len() == before {
-            let path = path.display();
-            return Err(CliError::usage(format!(
-                "{path}: there is no .glb or .gltf file in this folder or below; name another"
-            )));
-        }
-        files[before..].sort();
     }
     Ok(files)
-}
-
-fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), CliError> {
-    let io = |source| {
-        CliError::from(vlm_format::Error::Io { path: folder.to_owned(), action: "list the folder", source })
-    };
-    for entry in fs::read_dir(folder).map_err(io)? {
-        let entry = entry.map_err(io)?;
-        let path = entry.path();
-        if entry.file_type().map_err(io)?.is_dir() {
-            collect(&path, files)?;
-        } else if is_gltf(&path) && path.is_file() {
-            files.push(path);
-        }
-    }
-    Ok(())
-}
-
-fn is_gltf(path: &Path) -> bool {
-    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-    extension.eq_ignore_ascii_case("glb") || extension.eq_ignore_ascii_case("gltf")
 }
