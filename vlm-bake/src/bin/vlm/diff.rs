@@ -45,11 +45,8 @@ struct Report {
 /// [`CliError::Quiet`] if the files differ; [`CliError::Usage`] if one cannot be read or has no Virtual Light Mesh.
 pub fn run(args: &DiffArgs) -> Result<(), CliError> {
     let report = compare(args).map_err(|error| CliError::usage(error.to_string()))?;
-    if args.json {
-        print_json(&report)?
-    } else {
-        print(&report.lines())?
-    }
+    let printed = if args.json { print_json(&report) } else { print(&report.lines()) };
+    printed?;
     if report.diff.same { Ok(()) } else { Err(CliError::Quiet) }
 }
 
