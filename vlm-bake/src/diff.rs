@@ -4,9 +4,11 @@
 //! nearest that has no partner, by centroid and by the side from which it shines.
 
 use std::collections::{BTreeSet, HashMap};
+use std::fmt;
 
 use glam::{DMat4, DVec3, Vec3};
 use rstar::RTree;
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 use vlm_format::{GltfFile, Grid, Sample, Vlm, VlmAsset};
@@ -30,12 +32,12 @@ pub struct Side {
 }
 
 /// What differs.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Diff {
     /// True if nothing does.
     pub same: bool,
     /// Generator and settings that differ.
-    pub settings: Vec<Change<Value>>,
+    pub settings: Vec<Change<Setting>>,
     /// Objects whose lights differ.
     pub objects: Vec<ObjectDiff>,
     /// Tags of nodes, primitives and triangles of the visible surface that differ.
@@ -47,7 +49,7 @@ pub struct Diff {
 }
 
 /// A value before and after.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Change<T> {
     /// Its name.
     pub name: String,
@@ -57,8 +59,36 @@ pub struct Change<T> {
     pub to: T,
 }
 
+/// A setting's value.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Setting {
+    /// A number.
+    Number(f64),
+    /// A name.
+    Text(String),
+}
+
+impl Setting {
+    fn of(value: &Value) -> Self {
+        match value {
+            Value::String(text) => Self::Text(text.clone()),
+            other => other.as_f64().map_or_else(|| Self::Text(other.to_string()), Self::Number),
+        }
+    }
+}
+
+impl fmt::Display for Setting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => number.fmt(f),
+            Self::Text(text) => text.fmt(f),
+        }
+    }
+}
+
 /// The lights of one object.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct ObjectDiff {
     /// Node path, in the second file where it is there.
     pub object: String,
@@ -89,7 +119,7 @@ pub struct ObjectDiff {
 }
 
 /// How many, and by how much.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Amount {
     /// How many changed.
     pub count: u32,
@@ -100,7 +130,7 @@ pub struct Amount {
 }
 
 /// How many have another tag than before.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct TagsDiff {
     /// Nodes.
     pub nodes: usize,
@@ -111,7 +141,7 @@ pub struct TagsDiff {
 }
 
 /// The static grid.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct GridDiff {
     /// Numbers that differ; empty if only the content does.
     pub numbers: Vec<Change<f64>>,
@@ -202,7 +232,7 @@ fn change<T>(name: &str, from: T, to: T) -> Change<T> {
     Change { name: name.to_owned(), from, to }
 }
 
-fn settings(a: &VlmAsset, b: &VlmAsset) -> Vec<Change<Value>> {
+fn settings(a: &VlmAsset, b: &VlmAsset) -> Vec<Change<Setting>> {
     let all = |asset: &VlmAsset| {
         let mut json = serde_json::to_value(&asset.settings).unwrap_or_default();
         json["generator"] = Value::from(asset.generator.as_str());
@@ -210,7 +240,8 @@ fn settings(a: &VlmAsset, b: &VlmAsset) -> Vec<Change<Value>> {
     };
     let (a, b) = (all(a), all(b));
     let keys = a.as_object().into_iter().flat_map(|map| map.keys());
-    keys.filter(|key| a[*key] != b[*key]).map(|key| change(key, a[key].clone(), b[key].clone())).collect()
+    let differing = keys.filter(|key| a[*key] != b[*key]);
+    differing.map(|key| change(key, Setting::of(&a[key]), Setting::of(&b[key]))).collect()
 }
 
 fn reflected(side: &Side) -> [f64; 3] {

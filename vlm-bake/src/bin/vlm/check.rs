@@ -68,14 +68,19 @@ struct IssueShape {
     /// What is wrong there.
     message: String,
     /// What is stale: the id of a VLM, `grid`, or `asset` for what all share.
+    #[schemars(skip_serializing_if = "Option::is_none")]
     vlm: Option<String>,
     /// Number of the light that is not behind its surface.
+    #[schemars(skip_serializing_if = "Option::is_none")]
     light: Option<u32>,
     /// Path of the node of that light.
+    #[schemars(skip_serializing_if = "Option::is_none")]
     object: Option<String>,
     /// By how much that light would have to move, metres.
+    #[schemars(skip_serializing_if = "Option::is_none")]
     depth_m: Option<f64>,
     /// Where that light is worst, metres, world space.
+    #[schemars(skip_serializing_if = "Option::is_none")]
     place: Option<[f64; 3]>,
 }
 

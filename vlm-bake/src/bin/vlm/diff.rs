@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use schemars::JsonSchema;
 use serde::Serialize;
 use vlm_bake::diff::{Amount, Change, Diff, ObjectDiff, Side, TagsDiff, diff};
 use vlm_bake::scene::{LoadOptions, load};
@@ -28,8 +29,10 @@ pub struct DiffArgs {
     json: bool,
 }
 
-#[derive(Serialize)]
-struct Report {
+/// The report.
+#[derive(Serialize, JsonSchema)]
+pub struct DiffReport {
+    /// The file before and the one after.
     files: [String; 2],
     #[serde(flatten)]
     diff: Diff,
@@ -50,12 +53,12 @@ pub fn run(args: &DiffArgs) -> Result<(), CliError> {
     if report.diff.same { Ok(()) } else { Err(CliError::Quiet) }
 }
 
-fn compare(args: &DiffArgs) -> Result<Report, CliError> {
+fn compare(args: &DiffArgs) -> Result<DiffReport, CliError> {
     let (a, b) = (read(&args.before)?, read(&args.after)?);
     let clearance =
         args.clearance.then(|| Ok::<_, CliError>([clearance(&a)?, clearance(&b)?])).transpose()?;
     let files = [a.0.name().to_owned(), b.0.name().to_owned()];
-    Ok(Report { files, diff: diff(&Side::new(&a.0, a.1), &Side::new(&b.0, b.1)), clearance })
+    Ok(DiffReport { files, diff: diff(&Side::new(&a.0, a.1), &Side::new(&b.0, b.1)), clearance })
 }
 
 fn read(path: &Path) -> Result<(GltfFile, VlmAsset), CliError> {
@@ -72,7 +75,7 @@ fn clearance((file, asset): &(GltfFile, VlmAsset)) -> Result<ClearanceReport, Cl
     Ok(verify_asset(&load(file, &LoadOptions::default())?, asset).report())
 }
 
-impl Report {
+impl DiffReport {
     fn lines(&self) -> Vec<String> {
         let [before, after] = &self.files;
         let mut lines = Vec::new();

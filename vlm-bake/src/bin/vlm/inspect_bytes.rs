@@ -1,5 +1,6 @@
 //! What each part of the Virtual Light Meshes costs, in the file and in memory.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use vlm_format::{GltfFile, VlmAsset};
 
@@ -8,7 +9,7 @@ const LIGHTS: [&str; 5] = ["positions", "indices", "albedo", "emission", "tags"]
 const SAMPLES: [&str; 4] = ["starts", "positions", "normals", "reflectance"];
 
 /// Bytes of all parts.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Bytes {
     /// Of the file and the buffers beside it.
     file: u64,
@@ -22,7 +23,7 @@ pub struct Bytes {
 }
 
 /// Bytes of one part.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Part {
     part: &'static str,
     /// In memory; 0 for JSON.
