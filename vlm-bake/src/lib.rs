@@ -42,6 +42,7 @@ pub mod tag;
 pub mod tag_cost;
 pub mod prove;
 pub mod write;
+pub mod diff;
 
 pub mod bvh;
 pub mod grouped_bvh;

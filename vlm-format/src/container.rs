@@ -29,8 +29,8 @@ pub struct GltfFile {
     name: String,
     folder: Option<PathBuf>,
     kind: Kind,
-    /// What each level of the JSON is indented by; `None` for JSON on one line.
-    indent: Option<String>,
+    /// The JSON as it was written.
+    text: Text,
     json: Value,
     document: gltf::Document,
     /// The BIN chunk: buffer 0, if that has no URI.
@@ -42,6 +42,21 @@ pub struct GltfFile {
     /// Compressed buffer views, decoded when first asked for.
     decoded: Vec<OnceLock<Result<Vec<u8>, Issue>>>,
     warnings: Vec<Issue>,
+    /// Bytes of the main file.
+    main_bytes: usize,
+}
+
+/// JSON text as it stands in its file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Text {
+    /// Byte order mark and white space.
+    pub before: Vec<u8>,
+    /// The object, from brace to brace.
+    pub object: String,
+    /// White space; in a GLB, padding, which some writers make of zeros.
+    pub after: Vec<u8>,
+    /// What each level is indented by; `None` for JSON on one line.
+    pub indent: Option<String>,
 }
 
 impl GltfFile {
@@ -74,7 +89,7 @@ impl GltfFile {
             name: name.to_owned(),
             folder: folder.map(Path::to_owned),
             kind: packed.kind,
-            indent: packed.indent,
+            text: packed.text,
             document,
             bin: packed.bin.map(<[u8]>::to_vec),
             buffers,
@@ -82,6 +97,7 @@ impl GltfFile {
             decoded: array(&packed.json, "/bufferViews").iter().map(|_| OnceLock::new()).collect(),
             json: packed.json,
             warnings: report.into_issues(),
+            main_bytes: bytes.len(),
         })
     }
 
@@ -191,9 +207,15 @@ impl GltfFile {
         &self.other_chunks
     }
 
-    /// What each level of the JSON is indented by; `None` for JSON on one line.
-    pub(crate) fn indent(&self) -> Option<&str> {
-        self.indent.as_deref()
+    /// The JSON as it was written.
+    pub(crate) fn text(&self) -> &Text {
+        &self.text
+    }
+
+    /// Bytes of the .glb or .gltf file itself, without files beside it.
+    #[must_use]
+    pub fn main_bytes(&self) -> usize {
+        self.main_bytes
     }
 
     /// Where files beside this one lie.
@@ -209,7 +231,7 @@ fn cut_off(pointer: String) -> Issue {
 /// The parts of a file, before any check.
 struct Unpacked<'a> {
     kind: Kind,
-    indent: Option<String>,
+    text: Text,
     json: Value,
     bin: Option<&'a [u8]>,
     others: Vec<(u32, Vec<u8>)>,
@@ -219,40 +241,40 @@ fn unpack(bytes: &[u8]) -> Result<Unpacked<'_>, Issue> {
     if glb::is_glb(bytes) {
         let glb = glb::parse(bytes)?;
         let others = glb.others.into_iter().map(|(kind, data)| (kind, data.to_vec())).collect();
-        return Ok(Unpacked {
-            kind: Kind::Glb,
-            json: parse_json(glb.json)?,
-            bin: glb.bin,
-            others,
-            indent: indent(glb.json),
-        });
+        let (text, json) = parse_json(glb.json)?;
+        return Ok(Unpacked { kind: Kind::Glb, text, json, bin: glb.bin, others });
     }
-    let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    let text = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
     if text.trim_ascii_start().first() != Some(&b'{') {
         return Err(Issue::error(Code::NotGltf, "", "the file is neither GLB nor JSON"));
     }
-    Ok(Unpacked {
-        kind: Kind::Gltf,
-        json: parse_json(text)?,
-        bin: None,
-        others: Vec::new(),
-        indent: indent(text),
-    })
+    let (text, json) = parse_json(bytes)?;
+    Ok(Unpacked { kind: Kind::Gltf, text, json, bin: None, others: Vec::new() })
 }
+
+const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
 
 /// The white space before the first key, if that stands on a line of its own.
-fn indent(json: &[u8]) -> Option<String> {
-    let rest = json.trim_ascii_start().strip_prefix(b"{")?;
-    let blank = rest.iter().take_while(|byte| byte.is_ascii_whitespace()).count();
-    let line = rest[..blank].iter().rposition(|&byte| byte == b'\n')?;
-    std::str::from_utf8(&rest[line + 1..blank]).ok().map(str::to_owned)
+fn indent(json: &str) -> Option<String> {
+    let rest = json.strip_prefix('{')?;
+    let blank = &rest[..rest.len() - rest.trim_start().len()];
+    Some(blank[blank.rfind('\n')? + 1..].to_owned())
 }
 
-fn parse_json(bytes: &[u8]) -> Result<Value, Issue> {
+fn parse_json(bytes: &[u8]) -> Result<(Text, Value), Issue> {
+    let refuse = |error: &dyn std::fmt::Display| {
+        Issue::error(Code::JsonSyntax, "", format!("the JSON cannot be parsed: {error}"))
+    };
+    let marked = if bytes.starts_with(BYTE_ORDER_MARK) { BYTE_ORDER_MARK.len() } else { 0 };
+    let start = bytes.len() - bytes[marked..].trim_ascii_start().len();
     // Some writers pad the JSON chunk with zeros where the specification asks for spaces.
-    let end = bytes.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
-    serde_json::from_slice(&bytes[..end])
-        .map_err(|error| Issue::error(Code::JsonSyntax, "", format!("the JSON cannot be parsed: {error}")))
+    let is_padding = |byte: &u8| *byte == 0 || byte.is_ascii_whitespace();
+    let end = bytes.iter().rposition(|byte| !is_padding(byte)).map_or(0, |last| last + 1).max(start);
+    let json = serde_json::from_slice(&bytes[start..end]).map_err(|error| refuse(&error))?;
+    let object = std::str::from_utf8(&bytes[start..end]).map_err(|error| refuse(&error))?.to_owned();
+    let indent = indent(&object);
+    let text = Text { before: bytes[..start].to_vec(), object, after: bytes[end..].to_vec(), indent };
+    Ok((text, json))
 }
 
 /// The data of all buffers but the BIN chunk.

@@ -7,6 +7,7 @@
 // No input may crash a program that links this.
 #![warn(clippy::expect_used, clippy::panic, clippy::unreachable, clippy::todo)]
 
+mod code;
 mod error;
 mod glb;
 mod uri;
@@ -22,10 +23,16 @@ mod tags;
 mod validate;
 mod nodes;
 mod digest;
+mod place;
+mod recover;
 mod read;
+mod patch;
 mod strip;
 mod package;
 mod write;
+mod relink;
+mod sidecar;
+mod sizes;
 mod save;
 
 pub use asset::{Sample, Settings, Vlm, VlmAsset};
@@ -33,12 +40,14 @@ pub use container::{GltfFile, Kind};
 pub use error::{Code, Error, Issue, Severity, Stale};
 pub use grid::{Grid, Leaf, MOST_PROBES, Probe, Row, RowWriter, Uncovered};
 pub use package::{Container, OutputFile, Target};
-pub use read::{read_vlm, read_vlm_unchecked};
+pub use read::{read_vlm, read_vlm_recovered, read_vlm_unchecked};
+pub use relink::{Donor, RelinkOptions, Relinked, relink};
 pub use save::{write_atomic, write_file};
-pub use strip::EXTENSION;
+pub use sidecar::write_sidecar;
+pub use strip::{Difference, EXTENSION, Stripped, strip_vlm, strip_vlm_compared};
 pub use tags::TriangleTags;
 pub use validate::{MAX_ASPECT_RATIO, validate};
-pub use write::{WriteOptions, strip_vlm, write_vlm, write_vlm_with};
+pub use write::{WriteOptions, write_vlm, write_vlm_with};
 
 /// Compiles the code of the README.
 #[cfg(doctest)]

@@ -35,6 +35,12 @@ pub(crate) fn path(file: &GltfFile, parents: &[Option<usize>], node: usize) -> S
 }
 
 impl GltfFile {
+    /// Names of a node and its ancestors from the root down, such as `Room/Table/Leg`; unnamed ones read `node 7`.
+    #[must_use]
+    pub fn node_path(&self, node: u32) -> String {
+        path(self, &parents(self), node as usize)
+    }
+
     /// The global transform of every node at rest, metres, in the precision of the JSON. Rotations count as unit quaternions in spite of the
     /// file's rounding.
     ///

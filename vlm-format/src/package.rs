@@ -7,14 +7,13 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use base64::Engine;
-use serde::Serialize;
-use serde_json::ser::{PrettyFormatter, Serializer};
 use serde_json::{Value, json};
 
 use crate::check::array;
-use crate::container::{GltfFile, Kind};
+use crate::container::{GltfFile, Kind, Text};
 use crate::error::{Code, Error, Issue};
 use crate::glb;
+use crate::patch::{Patched, fresh, patch};
 use crate::uri;
 
 /// How an output is packed, and its file name.
@@ -74,6 +73,11 @@ impl Target {
         }
     }
 
+    /// The kind of file that the container is.
+    pub(crate) fn kind(&self) -> Kind {
+        if self.container == Container::Glb { Kind::Glb } else { Kind::Gltf }
+    }
+
     fn stem(&self) -> &str {
         self.file_name.rsplit_once('.').map_or(self.file_name.as_str(), |(stem, _)| stem)
     }
@@ -104,8 +108,8 @@ pub(crate) struct Parts {
     /// Files that relative URIs name.
     files: Vec<OutputFile>,
     kind: Kind,
-    /// What each level of the JSON is indented by; `None` for JSON on one line.
-    indent: Option<String>,
+    /// The text that the JSON's own follows, so that bytes stay and version control shows little more than what was added.
+    text: Text,
 }
 
 impl Parts {
@@ -125,24 +129,33 @@ impl Parts {
             others: file.other_chunks().to_vec(),
             files,
             kind: file.kind().clone(),
-            indent: file.indent().map(str::to_owned),
+            text: file.text().clone(),
         }
     }
 
-    /// Moves buffer 0 to where the target's container has it.
+    /// Moves buffer 0 to where the target's container has it. Text of another container is written anew.
     pub(crate) fn convert(&mut self, file: &GltfFile, target: &Target) {
-        match (&self.kind, target.container) {
-            (Kind::Gltf, Container::Glb) => {
-                self.indent = None;
-                self.buffer_to_bin(file);
-            }
-            (Kind::Glb, Container::Gltf { .. }) => {
-                self.indent = Some(String::from("  "));
-                self.bin_to_uri(target);
-            }
-            _ => {}
+        let kind = target.kind();
+        if self.kind == kind {
+            return;
         }
-        self.kind = if target.container == Container::Glb { Kind::Glb } else { Kind::Gltf };
+        let indent = match kind {
+            Kind::Glb => {
+                self.buffer_to_bin(file);
+                None
+            }
+            Kind::Gltf => {
+                self.bin_to_uri(target);
+                Some(String::from("  "))
+            }
+        };
+        self.text = Text { object: fresh(&self.json, indent.as_deref()), indent, ..Text::default() };
+        self.kind = kind;
+    }
+
+    /// Makes the JSON as it is now the text that later changes follow.
+    pub(crate) fn settle(&mut self) {
+        self.text.object = patch(&self.text.object, &self.json, self.text.indent.as_deref()).text;
     }
 
     /// Buffer 0 becomes the BIN chunk, unless it has no data (a fallback of compressed data).
@@ -209,14 +222,25 @@ impl Parts {
         }
     }
 
+    /// The bytes of the main file; `None` if they would exceed what a GLB can hold.
+    pub(crate) fn main_bytes(&self) -> Option<Vec<u8>> {
+        let Text { before, after, indent, .. } = &self.text;
+        let Patched { mut text, gap } = patch(&self.text.object, &self.json, indent.as_deref());
+        if let (Kind::Glb, Some(gap)) = (&self.kind, gap) {
+            // Padding of the chunk that goes when the additions go; the file's own stays at the end.
+            let length = before.len() + text.len() + after.len();
+            text.insert_str(gap, &"   "[..length.next_multiple_of(4) - length]);
+        }
+        let json = [before, text.as_bytes(), after].concat();
+        match self.kind {
+            Kind::Glb => glb::build(&json, self.bin.as_deref(), &self.others),
+            Kind::Gltf => Some(json),
+        }
+    }
+
     /// The files of the output; the main one first.
     pub(crate) fn pack(self, target: &Target) -> Result<Vec<OutputFile>, Error> {
-        let json = to_text(&self.json, self.indent.as_deref());
-        let bytes = match target.container {
-            Container::Glb => glb::build(&json, self.bin.as_deref(), &self.others),
-            Container::Gltf { .. } => Some(json),
-        };
-        let Some(bytes) = bytes else {
+        let Some(bytes) = self.main_bytes() else {
             return Err(
                 Issue::error(Code::TooLarge, "", "the output exceeds 4 GiB").in_file(&target.file_name)
             );
@@ -224,15 +248,6 @@ impl Parts {
         let main = OutputFile { path: PathBuf::from(&target.file_name), bytes, copied_from: None };
         Ok(std::iter::once(main).chain(self.files).collect())
     }
-}
-
-/// JSON in the style of its source, so that version control shows little more than what was added.
-fn to_text(json: &Value, indent: Option<&str>) -> Vec<u8> {
-    let Some(indent) = indent else { return json.to_string().into_bytes() };
-    let mut text = Vec::new();
-    let style = PrettyFormatter::with_indent(indent.as_bytes());
-    let written = json.serialize(&mut Serializer::with_formatter(&mut text, style));
-    if written.is_ok() { text } else { json.to_string().into_bytes() }
 }
 
 /// Encodes what may not stand in a relative URI (RFC 3986, section 3.3; `:` could be taken for a scheme).

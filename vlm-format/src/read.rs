@@ -11,6 +11,8 @@ use crate::digest::{self, Source};
 use crate::error::{Error, Issue, Stale};
 use crate::grid::Grid;
 use crate::nodes;
+use crate::place;
+use crate::recover::Arrays;
 use crate::strip::EXTENSION;
 use crate::tags::{TriangleTags, elements};
 use crate::validate::validate_in;
@@ -32,30 +34,47 @@ pub fn read_vlm_unchecked(file: &GltfFile) -> Result<Option<VlmAsset>, Error> {
     read(file, Trust::Blind)
 }
 
+/// Reads as [`read_vlm`] does, and finds arrays by their digests wherever they are: for files in which another tool renumbered accessors.
+///
+/// # Errors
+/// As [`read_vlm`].
+pub fn read_vlm_recovered(file: &GltfFile) -> Result<Option<VlmAsset>, Error> {
+    read(file, Trust::Recover)
+}
+
 #[derive(Clone, Copy, PartialEq)]
 enum Trust {
     Verify,
     Blind,
+    /// As `Verify`, without a look at the accessors' numbers.
+    Recover,
 }
 
 fn read(file: &GltfFile, trust: Trust) -> Result<Option<VlmAsset>, Error> {
     let Some(extension) = file.json().get("extensions").and_then(|all| all.get(EXTENSION)) else {
         return if_orphaned(file).map_or(Ok(None), |stale| refuse(file, vec![stale]));
     };
-    let mut reader = Reader { file, extension, trust, stale: Vec::new(), invalid: Vec::new(), unclaimed: 0 };
-    reader.check_shape();
-    reader.fail_if_stale()?;
+    let arrays = if trust == Trust::Recover { Arrays::of(file) } else { Arrays::default() };
+    let mut reader =
+        Reader { file, extension, trust, arrays, stale: Vec::new(), invalid: Vec::new(), unclaimed: 0 };
+    if trust != Trust::Recover {
+        reader.check_shape();
+        reader.fail_if_stale()?;
+    }
     let mut asset = reader.asset();
     reader.fail_if_invalid()?;
     reader.bearers(&mut asset);
     reader.fail_if_stale()?;
-    if trust == Trust::Verify {
+    if trust != Trust::Blind {
         reader.compare_sources(&asset)?;
         reader.fail_if_stale()?;
     }
     match validate_in(file, &asset) {
         issues if issues.is_empty() => Ok(Some(asset)),
-        issues => Err(Error::Invalid { file: file.name().to_owned(), issues }),
+        issues => {
+            let issues = issues.into_iter().map(place::in_file).collect();
+            Err(Error::Invalid { file: file.name().to_owned(), issues })
+        }
     }
 }
 
@@ -67,11 +86,12 @@ fn refuse<T>(file: &GltfFile, stale: Vec<Stale>) -> Result<T, Error> {
 fn if_orphaned(file: &GltfFile) -> Option<Stale> {
     let nodes = array(file.json(), "/nodes");
     let node = nodes.iter().position(|node| own(node).is_some())?;
+    let pointer = format!("/nodes/{node}/extensions/{EXTENSION}");
     let path = nodes::path(file, &nodes::parents(file), node);
     let what =
         if nodes.get(node).and_then(own)?.get("vlms").is_some() { "refers to" } else { "has a tag of" };
     let reason = format!("`{path}` {what} a VLM, but another tool removed the root object of the extension");
-    Some(Stale { vlm: String::from("asset"), reason })
+    Some(Stale { vlm: String::from("asset"), pointer, reason })
 }
 
 /// The extension's object in a node or primitive.
@@ -83,6 +103,8 @@ struct Reader<'a> {
     file: &'a GltfFile,
     extension: &'a Value,
     trust: Trust,
+    /// Where arrays may be found by digest.
+    arrays: Arrays,
     stale: Vec<Stale>,
     /// Compression that no writer makes.
     invalid: Vec<Issue>,
@@ -122,14 +144,15 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn outdated(&mut self, vlm: &str, reason: String) {
-        self.stale.push(Stale { vlm: vlm.to_owned(), reason });
+    fn outdated(&mut self, vlm: &str, pointer: impl Into<String>, reason: String) {
+        self.stale.push(Stale { vlm: vlm.to_owned(), pointer: pointer.into(), reason });
     }
 
     /// An extension that lost properties, or accessors that do not exist, were left behind by another tool.
     fn check_shape(&mut self) {
         for Issue { pointer, message, .. } in check::check_extension(self.file.json()).into_issues() {
-            self.outdated("asset", format!("another tool altered the file: {pointer}: {message}"));
+            let reason = format!("another tool altered the file: {pointer}: {message}");
+            self.outdated("asset", pointer, reason);
         }
     }
 
@@ -228,10 +251,8 @@ impl<'a> Reader<'a> {
                 _ => 0,
             };
             if !self.claim(claimed) {
-                self.outdated(
-                    "asset",
-                    format!("another tool altered the file: `{name}` claims more than there is"),
-                );
+                let reason = format!("another tool altered the file: `{name}` claims more than there is");
+                self.outdated("asset", pointer, reason);
                 break;
             }
             let tags = self.integers_at(&Place { json: Some(json), name, pointer, vlm: "asset" });
@@ -240,8 +261,22 @@ impl<'a> Reader<'a> {
         all
     }
 
+    /// The accessor of an array: the one that it names, or, when recovering, any that holds it.
+    fn accessor(&self, json: &Value, kind: &str) -> usize {
+        let named = index(json, "accessor").unwrap_or(usize::MAX);
+        if self.trust != Trust::Recover {
+            return named;
+        }
+        let digest = digest::text(json, "digest");
+        self.arrays.find(self.file, json.get(compress::PROPERTY), kind, digest).unwrap_or(named)
+    }
+
     /// Takes bytes of the buffer view for one array; false if so many are not left.
     fn claim(&mut self, bytes: usize) -> bool {
+        if self.trust == Trust::Recover {
+            // The view is where another tool put it, or gone. A user asks for this, of a file of his own.
+            return true;
+        }
         let rest = self.unclaimed.checked_sub(bytes);
         self.unclaimed = rest.unwrap_or(self.unclaimed);
         rest.is_some()
@@ -291,8 +326,8 @@ impl<'a> Reader<'a> {
         kind: &str,
         read: impl Fn(&GltfFile, usize) -> Result<(Vec<T>, Vec<u8>), Error>,
     ) -> Vec<T> {
-        let Place { json: Some(json), name, vlm, .. } = place else { return Vec::new() };
-        let accessor = index(json, "accessor").unwrap_or(usize::MAX);
+        let Place { json: Some(json), name, vlm, pointer } = place else { return Vec::new() };
+        let accessor = self.accessor(json, kind);
         let altered = format!("accessor {accessor} `{name}` was renumbered or altered by another tool");
         let found = match json.get(compress::PROPERTY) {
             None => read(self.file, accessor).map_err(|error| Refusal::Altered(why(error))),
@@ -300,13 +335,13 @@ impl<'a> Reader<'a> {
         };
         match found {
             Ok((_, bytes))
-                if self.trust == Trust::Verify
+                if self.trust != Trust::Blind
                     && digest::of_array(kind, &bytes) != digest::text(json, "digest") =>
             {
-                self.outdated(vlm, altered);
+                self.outdated(vlm, pointer, altered);
             }
             Ok((values, _)) => return values,
-            Err(Refusal::Altered(why)) => self.outdated(vlm, format!("{altered} ({why})")),
+            Err(Refusal::Altered(why)) => self.outdated(vlm, pointer, format!("{altered} ({why})")),
             Err(Refusal::Invalid(issue)) => self.invalid.push(issue),
         }
         Vec::new()
@@ -337,7 +372,8 @@ impl<'a> Reader<'a> {
         let json = array(self.file.json(), "/accessors").get(accessor).unwrap_or(&Value::Null);
         let view = self.extension.get("data").and_then(|data| index(data, "bufferView"));
         let plain = self.view().is_some_and(|view| layout::meshopt(view).is_none());
-        if !plain || index(json, "bufferView") != view || json.get("sparse").is_some() {
+        let ours = plain && index(json, "bufferView") == view && json.get("sparse").is_none();
+        if !ours && self.trust != Trust::Recover {
             return refuse("it does not lie in the buffer view of the extension");
         }
         if count(json, "count") != Some(length) {
@@ -356,23 +392,33 @@ impl<'a> Reader<'a> {
         for (node, json) in array(self.file.json(), "/nodes").iter().enumerate() {
             let ids = own(json).map_or(&[][..], |own| array(own, "/vlms")).iter().filter_map(Value::as_str);
             let path = || nodes::path(self.file, &parents, node);
+            let pointer = || format!("/nodes/{node}/extensions/{EXTENSION}/vlms");
             for id in ids {
                 match asset.vlms.iter().position(|vlm| vlm.id == id) {
-                    None => self.outdated(id, format!("`{}` refers to it, but it does not exist", path())),
+                    None => {
+                        self.outdated(
+                            id,
+                            pointer(),
+                            format!("`{}` refers to it, but it does not exist", path()),
+                        );
+                    }
                     Some(vlm) => match bearers[vlm] {
                         None => bearers[vlm] = Some(node),
                         Some(first) => {
                             let first = nodes::path(self.file, &parents, first);
-                            self.outdated(id, format!("both `{first}` and `{}` refer to it", path()));
+                            let reason = format!("both `{first}` and `{}` refer to it", path());
+                            self.outdated(id, pointer(), reason);
                         }
                     },
                 }
             }
         }
-        for (vlm, bearer) in asset.vlms.iter_mut().zip(bearers) {
+        for (i, (vlm, bearer)) in asset.vlms.iter_mut().zip(bearers).enumerate() {
             match bearer {
                 Some(node) => vlm.node = node as u32,
-                None => self.outdated(&vlm.id, String::from("no node refers to it any more")),
+                None => {
+                    self.outdated(&vlm.id, vlm_pointer(i), String::from("no node refers to it any more"));
+                }
             }
         }
     }
@@ -382,23 +428,31 @@ impl<'a> Reader<'a> {
         let parents = nodes::parents(self.file);
         let mut source = Source::new(self.file);
 
-        for (vlm, json) in asset.vlms.iter().zip(array(self.extension, "/vlms")) {
+        for (i, (vlm, json)) in asset.vlms.iter().zip(array(self.extension, "/vlms")).enumerate() {
             let node = vlm.node as usize;
             let digests = json.get("digests").unwrap_or(&Value::Null);
             let path = nodes::path(self.file, &parents, node);
             if source.geometry(node)? != digest::text(digests, "geometry") {
-                self.outdated(&vlm.id, format!("geometry or colours of `{path}` changed"));
+                let reason = format!("geometry or colours of `{path}` changed");
+                self.outdated(&vlm.id, format!("{}/digests/geometry", vlm_pointer(i)), reason);
             }
             if asset.grid.is_some() && source.transform(node)? != digest::text(digests, "transform") {
-                self.outdated("grid", format!("`{path}` was moved"));
+                let pointer = format!("{}/digests/transform", vlm_pointer(i));
+                self.outdated("grid", pointer, format!("`{path}` was moved"));
             }
         }
         let Some(grid) = self.extension.get("grid") else { return Ok(()) };
         if self.stale.is_empty() && source.scene()? != digest::text(grid, "sceneDigest") {
-            self.outdated("grid", String::from("a visible object was added, removed, moved or changed"));
+            let reason = String::from("a visible object was added, removed, moved or changed");
+            self.outdated("grid", format!("/extensions/{EXTENSION}/grid/sceneDigest"), reason);
         }
         Ok(())
     }
+}
+
+/// JSON pointer of a VLM in the extension.
+fn vlm_pointer(vlm: usize) -> String {
+    format!("/extensions/{EXTENSION}/vlms/{vlm}")
 }
 
 fn vlm(json: &Value) -> Vlm {

@@ -13,7 +13,7 @@ use crate::digest::{self, Source};
 use crate::error::Error;
 use crate::grid::Grid;
 use crate::package::{OutputFile, Parts, Target};
-use crate::strip::{EXTENSION, strip};
+use crate::strip::{EMPTY, EXTENSION, empty_places, source_digest, strip};
 use crate::validate::validate_in;
 
 /// How [`write_vlm_with`] stores an asset.
@@ -52,24 +52,22 @@ pub fn write_vlm_with(
         return Err(Error::Asset { issues });
     }
     let mut parts = Parts::of(file);
-    strip(&mut parts);
+    let removed = strip(&mut parts);
+    let source_digest = source_digest(file, &parts, removed.is_some());
     parts.convert(file, target);
+    let traces = Traces { source_digest, empty: empty_places(&mut parts.json) };
     let mut extension = Arrays::new(&parts.json, options).extension(asset);
     add_digests(&mut extension.json, file, asset)?;
     refer(&mut parts.json, asset, std::mem::take(&mut extension.triangle_tags));
-    extension.append_to(&mut parts, target);
+    extension.append_to(&mut parts, target, traces);
     parts.pack(target)
 }
 
-/// Takes the Virtual Light Meshes out of a file, which is then as it was before [`write_vlm`].
-///
-/// # Errors
-/// [`Error::Invalid`] if the output would be too large.
-pub fn strip_vlm(file: &GltfFile, target: &Target) -> Result<Vec<OutputFile>, Error> {
-    let mut parts = Parts::of(file);
-    strip(&mut parts);
-    parts.convert(file, target);
-    parts.pack(target)
+/// What stripping has to know of the file before writing.
+struct Traces {
+    source_digest: Option<String>,
+    /// Pointers of lists and objects that were there, and empty.
+    empty: Vec<String>,
 }
 
 /// The arrays of an asset on their way into one buffer view.
@@ -248,7 +246,7 @@ fn add_digests(extension: &mut Map<String, Value>, file: &GltfFile, asset: &VlmA
 
 impl Extension {
     /// Appends data, buffer view and accessors, and sets the root object.
-    fn append_to(mut self, parts: &mut Parts, target: &Target) {
+    fn append_to(mut self, parts: &mut Parts, target: &Target, traces: Traces) {
         let (view, byte_length) = (self.arrays.view, self.arrays.bytes.len());
         let place = if parts.appends_to_bin() {
             append_to_bin(parts, &self.arrays.bytes)
@@ -268,10 +266,14 @@ impl Extension {
         for accessor in self.arrays.accessors {
             push(&mut parts.json, "accessors", accessor);
         }
-        self.json.insert(
-            String::from("data"),
-            json!({ "bufferView": view, "bufferByteLength": place.length_before }),
-        );
+        let mut data = json!({ "bufferView": view, "bufferByteLength": place.length_before });
+        if let Some(digest) = traces.source_digest {
+            data["sourceDigest"] = json!(digest);
+        }
+        if !traces.empty.is_empty() {
+            data[EMPTY] = json!(traces.empty);
+        }
+        self.json.insert(String::from("data"), data);
         let mut json = Value::Object(self.json);
         shorten_floats(&mut json);
         insert_extension(&mut parts.json, json);

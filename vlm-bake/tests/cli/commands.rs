@@ -1,4 +1,4 @@
-//! `vlm check`, `vlm inspect` and `vlm strip`.
+//! `vlm check`, `vlm inspect` and `vlm strip` on what was baked.
 
 use std::path::Path;
 
@@ -52,7 +52,7 @@ fn check_names_what_is_stale() {
     }
     let issues = &json_of(&output)[0]["issues"];
     assert_eq!(issues[0]["code"], json!("STALE"));
-    assert_eq!(issues[0]["pointer"], json!("room"));
+    assert_eq!(issues[0]["vlm"], json!("room"));
 }
 
 #[test]

@@ -66,6 +66,14 @@ fn reports(name: &str) -> Vec<Value> {
             assert!(run(["bake", &room, "-o", &bare, "--lights", "60", "--probes", "0"]).status.success());
             vec![json_of(&["inspect", &baked, "--json"]), json_of(&["inspect", &bare, "--json"])]
         }
+        "diff" => {
+            let other = folders.output("other.glb");
+            assert!(run(["bake", &room, "-o", &other, "--lights", "90", "--probes", "0"]).status.success());
+            vec![
+                json_of(&["diff", &baked, &other, "--clearance", "--json"]),
+                json_of(&["diff", &baked, &baked, "--json"]),
+            ]
+        }
         "render" => vec![json_of(&["render", &baked, "--size", "8x8", "--json"])],
         other => panic!("no test makes a report `{other}`: add one here"),
     }
@@ -154,9 +162,13 @@ fn changed_reports_are_not() {
 
 #[test]
 fn a_report_without_a_property_is_not_valid() {
-    for (name, key) in
-        [("bake", "clearance"), ("check", "issues"), ("inspect", "vlms"), ("render", "seconds")]
-    {
+    for (name, key) in [
+        ("bake", "clearance"),
+        ("check", "issues"),
+        ("inspect", "vlms"),
+        ("diff", "objects"),
+        ("render", "seconds"),
+    ] {
         let mut report = reports(name).remove(0);
         let object = if report.is_array() { &mut report[0] } else { &mut report };
         let value = object.as_object_mut().unwrap().remove(key).unwrap();

@@ -32,7 +32,15 @@ const ARRAY: Shape =
 const ROOT: &[Field] = &[
     must("generator", Text),
     must("settings", Object(&[])),
-    must("data", Object(&[must("bufferView", VIEW), must("bufferByteLength", Count)])),
+    must(
+        "data",
+        Object(&[
+            must("bufferView", VIEW),
+            must("bufferByteLength", Count),
+            may("sourceDigest", Text),
+            may("emptyBefore", Texts),
+        ]),
+    ),
     must(
         "vlms",
         Objects(&[

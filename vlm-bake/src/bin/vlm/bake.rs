@@ -13,7 +13,7 @@ use vlm_bake::report::Report;
 use vlm_bake::report_html::{Subjects, report_html};
 use vlm_bake::scene::Scene;
 use vlm_bake::settings::BakeSettings;
-use vlm_format::{GltfFile, OutputFile, write_file};
+use vlm_format::{GltfFile, OutputFile, write_file, write_sidecar};
 
 use crate::batch::{self, Asked, BatchArgs};
 use crate::error::CliError;
@@ -36,6 +36,9 @@ pub struct BakeArgs {
     output: Option<PathBuf>,
     #[command(flatten)]
     settings: SettingsArgs,
+    /// Also write the Virtual Light Meshes alone, for `vlm relink`
+    #[arg(long, value_name = "FILE.glb", conflicts_with = "out_dir")]
+    sidecar: Option<PathBuf>,
     /// Write what was made as JSON
     #[arg(long, value_name = "FILE.json")]
     report: Option<PathBuf>,
@@ -92,14 +95,17 @@ struct One<'a> {
 fn bake_one(one: &One) -> Result<(), CliError> {
     let (args, bars) = (one.args, Bars::new());
     let target = target(one.output)?;
-    let named = [args.report.as_deref(), args.report_html.as_deref(), args.preview.as_deref()];
-    named.into_iter().flatten().chain([one.output]).try_for_each(check_folder)?;
+    let named = [&args.sidecar, &args.report, &args.report_html, &args.preview];
+    named.into_iter().filter_map(|path| path.as_deref()).chain([one.output]).try_for_each(check_folder)?;
     let settings = one.settings()?;
 
     bars.begin("read", 1);
     let file = open(one.input)?;
     let Made { scene, bake, outputs } = make(&file, &settings, &target, &mut Memory::default(), &bars)?;
     deliver(one.output, &outputs)?;
+    if let Some(path) = &args.sidecar {
+        write_file(path, &write_sidecar(&file, &bake.asset)?)?;
+    }
     if let Some(path) = &args.report {
         write_json(path, &bake.report)?;
     }

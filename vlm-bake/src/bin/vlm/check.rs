@@ -5,39 +5,49 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
-use serde_json::{Value, json};
 use vlm_bake::scene::Scene;
-use vlm_format::{Error, read_vlm};
+use vlm_format::{Code, GltfFile, Issue, read_vlm};
 
 use crate::error::CliError;
+use crate::files::gltf_files;
 use crate::geometry::{Proof, prove, source};
 use crate::input::open_checked;
 use crate::output::{print, print_json};
+use crate::problem::Problem;
+use crate::sarif::sarif;
+
+/// Problems of a file that the text report spells out; `--json` has all.
+const SPELT_OUT: usize = 10;
 
 /// Flags of `vlm check`.
 #[derive(Args)]
 pub struct CheckArgs {
-    /// glTF files (.glb or .gltf), or - for standard input (.glb)
-    #[arg(required = true, value_name = "FILE")]
-    files: Vec<PathBuf>,
+    /// glTF files, folders (every .glb and .gltf below them), globs, or - for standard input (.glb)
+    #[arg(required = true, value_name = "FILE|FOLDER")]
+    paths: Vec<PathBuf>,
     /// Also prove that the lights lie behind the surface of this file, from which they were baked
     #[arg(long, value_name = "SOURCE")]
     geometry: Option<PathBuf>,
     /// Report as JSON
     #[arg(long)]
     json: bool,
+    /// Report as SARIF 2.1.0, for code scanning in CI
+    #[arg(long, conflicts_with = "json")]
+    sarif: bool,
 }
 
 /// What was found in one file.
 #[derive(Serialize, JsonSchema)]
 pub struct Finding {
-    file: String,
+    /// The path, as it was named or found.
+    pub file: String,
+    /// True if there is no error; there may be warnings.
     ok: bool,
     lights: usize,
-    /// `{ code, severity, pointer, message }` each.
+    /// Errors and warnings: `{ code, severity, pointer, message }` each, with `vlm` where something is stale.
     #[schemars(with = "Vec<IssueShape>")]
-    issues: Vec<Value>,
-    /// One line with remedy that sums the issues up; empty if there are none.
+    pub issues: Vec<Problem>,
+    /// One line with remedy that sums the errors up; empty if there are none.
     summary: String,
     /// The proof that the lights lie behind their surface, where it was asked for and could be had.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -53,102 +63,140 @@ struct IssueShape {
     code: String,
     /// `error` or `warning`.
     severity: String,
-    /// JSON pointer, or the id of the VLM.
+    /// JSON pointer into the file; empty for the file as a whole.
     pointer: String,
     /// What is wrong there.
     message: String,
+    /// What is stale: the id of a VLM, `grid`, or `asset` for what all share.
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    vlm: Option<String>,
+    /// Number of the light that is not behind its surface.
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    light: Option<u32>,
+    /// Path of the node of that light.
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    object: Option<String>,
+    /// By how much that light would have to move, metres.
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    depth_m: Option<f64>,
+    /// Where that light is worst, metres, world space.
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    place: Option<[f64; 3]>,
 }
 
 /// Runs the command.
 ///
 /// # Errors
-/// If a file cannot be read, or any file failed.
+/// [`CliError::Check`] if any file failed; [`CliError::Usage`] if none could be read.
 pub fn run(args: &CheckArgs) -> Result<(), CliError> {
+    let files = gltf_files(&args.paths)?;
     let source = args.geometry.as_deref().map(source).transpose()?;
-    let findings =
-        args.files.iter().map(|path| check(path, source.as_ref())).collect::<Result<Vec<_>, _>>()?;
-    if args.json {
+    let findings: Vec<Finding> = files.iter().map(|path| check(path, source.as_ref())).collect();
+    if args.sarif {
+        print_json(&sarif(&findings))?;
+    } else if args.json {
         print_json(&findings)?;
     } else {
-        print(&findings.iter().flat_map(lines).collect::<Vec<_>>())?;
+        print(&findings.iter().flat_map(Finding::lines).collect::<Vec<_>>())?;
     }
+    verdict(&findings)
+}
+
+fn verdict(findings: &[Finding]) -> Result<(), CliError> {
     let failed: Vec<&Finding> = findings.iter().filter(|finding| !finding.ok).collect();
-    match failed.as_slice() {
-        [] => Ok(()),
-        [only] => Err(CliError::Check(only.summary.clone())),
+    let message = match failed.as_slice() {
+        [] => return Ok(()),
+        [only] => only.summary.clone(),
         [first, ..] => {
-            let (failed, all) = (failed.len(), findings.len());
-            Err(CliError::Check(format!("{failed} of {all} files failed; the first: {}", first.summary)))
+            format!("{} of {} files failed; the first: {}", failed.len(), findings.len(), first.summary)
         }
+    };
+    // Where nothing could be read, nothing was checked.
+    let unread = findings.iter().all(|finding| finding.issues.iter().any(|p| p.issue.code == Code::Io));
+    Err(if unread { CliError::usage(message) } else { CliError::Check(message) })
+}
+
+fn check(path: &Path, source: Option<&Scene>) -> Finding {
+    let name = path.display().to_string();
+    match open_checked(path) {
+        Ok(file) => check_opened(&file, source),
+        Err(error) => Finding::failed(&name, Problem::all_of(&error), error.to_string()),
     }
 }
 
-fn lines(finding: &Finding) -> Vec<String> {
-    if !finding.ok {
-        let mut lines = vec![format!("FAILED    {}: {} issues", finding.file, finding.issues.len())];
-        lines.extend(finding.geometry.iter().flat_map(Proof::lines));
-        return lines;
-    }
-    let proof = finding.geometry.as_ref().map_or_else(String::new, |proof| {
-        format!(
-            ", all behind their surface ({} points; {} lights fail and are tagged)",
-            proof.clearance.samples, proof.tagged_lights
-        )
-    });
-    vec![format!("ok        {}: {} lights{proof}", finding.file, finding.lights)]
-}
-
-/// # Errors
-/// If the file cannot be read at all.
-fn check(path: &Path, source: Option<&Scene>) -> Result<Finding, CliError> {
-    let result = open_checked(path).and_then(|file| Ok((read_vlm(&file)?, file)));
-    let file = path.display().to_string();
-    let bare =
-        Finding { file, ok: false, lights: 0, issues: Vec::new(), summary: String::new(), geometry: None };
-    match result {
-        Ok((Some(asset), file)) => {
-            let geometry = source.map(|source| prove(file.name(), &asset, source)).transpose()?;
-            let issues = geometry.as_ref().map_or_else(Vec::new, Proof::issues);
-            let summary = geometry.as_ref().and_then(|proof| proof.summary(file.name())).unwrap_or_default();
-            Ok(Finding {
-                ok: issues.is_empty(),
-                lights: asset.triangles.len(),
-                issues,
-                summary,
-                geometry,
-                ..bare
-            })
+fn check_opened(file: &GltfFile, source: Option<&Scene>) -> Finding {
+    let name = file.name();
+    let mut finding = match read_vlm(file) {
+        Ok(Some(asset)) => {
+            let mut found = Finding { lights: asset.triangles.len(), ..Finding::passed(name) };
+            match source.map(|source| prove(&asset, source)).transpose() {
+                Ok(proof) => found.add(proof),
+                Err(issue) => return Finding::of(file, issue),
+            }
+            found
         }
         // Tools that drop what they do not know are why one checks at the end of a pipeline.
-        Ok((None, file)) => {
-            let issue = json!({
-                "code": "NO_VLM", "severity": "error", "pointer": "/extensions",
-                "message": "the file has no Virtual Light Mesh",
-            });
-            let summary = format!(
-                "{}: /extensions: the file has no Virtual Light Mesh [NO_VLM]; bake it, as the last step after every other \
-                 tool",
-                file.name()
-            );
-            Ok(Finding { issues: vec![issue], summary, ..bare })
+        Ok(None) => {
+            return Finding::of(file, Issue::error(Code::NoVlm, "/extensions", Code::NoVlm.meaning()));
         }
-        Err(error @ Error::Io { .. }) => Err(error.into()),
-        Err(error) => Ok(Finding { issues: issues(&error), summary: error.to_string(), ..bare }),
+        Err(error) => Finding::failed(name, Problem::all_of(&error), error.to_string()),
+    };
+    finding.issues.extend(file.warnings().iter().cloned().map(Problem::from));
+    finding
+}
+
+impl Finding {
+    fn passed(file: &str) -> Self {
+        Self {
+            file: file.to_owned(),
+            ok: true,
+            lights: 0,
+            issues: Vec::new(),
+            summary: String::new(),
+            geometry: None,
+        }
+    }
+
+    fn failed(file: &str, issues: Vec<Problem>, summary: String) -> Self {
+        Self { ok: false, issues, summary, ..Self::passed(file) }
+    }
+
+    /// A file that opens, with one error.
+    fn of(file: &GltfFile, issue: Issue) -> Self {
+        let summary = format!("{}: {issue}", file.name());
+        let warnings = file.warnings().iter().cloned();
+        let issues = std::iter::once(issue).chain(warnings).map(Problem::from).collect();
+        Self::failed(file.name(), issues, summary)
+    }
+
+    fn add(&mut self, proof: Option<Proof>) {
+        let Some(proof) = proof else { return };
+        self.issues = proof.problems();
+        self.ok = self.issues.is_empty();
+        self.summary = proof.summary(&self.file).unwrap_or_default();
+        self.geometry = Some(proof);
+    }
+
+    fn lines(&self) -> Vec<String> {
+        let errors = self.issues.iter().filter(|problem| problem.is_error()).count();
+        let warnings = self.issues.len() - errors;
+        let proof = self.geometry.as_ref().filter(|_| self.ok).map_or_else(String::new, Proof::sentence);
+        let and_warnings =
+            if warnings > 0 { format!(", {}", counted(warnings, "warning")) } else { String::new() };
+        let head = if self.ok {
+            format!("ok        {}: {} lights{proof}{and_warnings}", self.file, self.lights)
+        } else {
+            format!("FAILED    {}: {}{and_warnings}", self.file, counted(errors, "error"))
+        };
+        let mut lines = vec![head];
+        lines.extend(self.issues.iter().take(SPELT_OUT).map(|problem| format!("  {}", problem.line())));
+        if self.issues.len() > SPELT_OUT {
+            lines.push(format!("  and {} more; --json lists all", self.issues.len() - SPELT_OUT));
+        }
+        lines
     }
 }
 
-/// Every problem, in one form whatever its kind.
-fn issues(error: &Error) -> Vec<Value> {
-    match error {
-        Error::Invalid { issues, .. } | Error::Asset { issues } => {
-            issues.iter().map(|issue| json!(issue)).collect()
-        }
-        Error::Stale { stale, .. } => stale
-            .iter()
-            .map(|s| json!({ "code": "STALE", "severity": "error", "pointer": s.vlm, "message": s.reason }))
-            .collect(),
-        other => {
-            vec![json!({ "code": "IO", "severity": "error", "pointer": "", "message": other.to_string() })]
-        }
-    }
+fn counted(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }

@@ -16,6 +16,8 @@ pub enum CliError {
     Check(String),
     /// The command could not run: exit code 2.
     Usage(String),
+    /// The report on stdout says it all: exit code 1, and nothing on stderr.
+    Quiet,
 }
 
 impl CliError {
@@ -32,7 +34,7 @@ impl CliError {
     /// The code that tells a script which of the two it was.
     pub fn exit_code(&self) -> ExitCode {
         match self {
-            Self::Check(_) => ExitCode::from(1),
+            Self::Check(_) | Self::Quiet => ExitCode::from(1),
             Self::Usage(_) => ExitCode::from(2),
         }
     }
@@ -42,6 +44,7 @@ impl fmt::Display for CliError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Check(message) | Self::Usage(message) => f.write_str(message),
+            Self::Quiet => Ok(()),
         }
     }
 }

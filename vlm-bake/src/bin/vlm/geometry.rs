@@ -4,16 +4,13 @@ use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use serde_json::{Value, json};
 use vlm_bake::scene::{LoadOptions, Scene, load};
 use vlm_bake::verify::{ClearanceReport, Finding, FindingKind, verify_asset};
-use vlm_format::VlmAsset;
+use vlm_format::{Code, EXTENSION, Issue, VlmAsset};
 
 use crate::error::CliError;
 use crate::input::open;
-
-/// Findings that the text report spells out; the JSON report has all.
-const SPELT_OUT: usize = 10;
+use crate::problem::{LightPlace, Problem};
 
 /// The proof of one file.
 #[derive(Serialize, JsonSchema)]
@@ -39,17 +36,13 @@ pub fn source(path: &Path) -> Result<Scene, CliError> {
 /// Proves an asset on the surface of its source.
 ///
 /// # Errors
-/// [`CliError::Check`] if the source lacks a node that bears lights.
-pub fn prove(file: &str, asset: &VlmAsset, source: &Scene) -> Result<Proof, CliError> {
-    if let Some(vlm) = asset.vlms.iter().find(|vlm| source.objects.iter().all(|o| o.node != vlm.node)) {
-        return Err(CliError::check(
-            file,
-            format!(
-                "node {} bears the lights `{}`, but the source has no geometry there; name the file that was baked, or \
-                 bake again",
-                vlm.node, vlm.id
-            ),
-        ));
+/// [`Code::NotInSource`] if the source lacks a node that bears lights.
+pub fn prove(asset: &VlmAsset, source: &Scene) -> Result<Proof, Issue> {
+    let lacks = |node: u32| source.objects.iter().all(|object| object.node != node);
+    if let Some((i, vlm)) = asset.vlms.iter().enumerate().find(|(_, vlm)| lacks(vlm.node)) {
+        let message =
+            format!("node {} bears the lights `{}`, but the source has no geometry there", vlm.node, vlm.id);
+        return Err(Issue::error(Code::NotInSource, format!("/extensions/{EXTENSION}/vlms/{i}"), message));
     }
     let verification = verify_asset(source, asset);
     let mut failing: Vec<Finding> = verification.untagged().cloned().collect();
@@ -59,56 +52,49 @@ pub fn prove(file: &str, asset: &VlmAsset, source: &Scene) -> Result<Proof, CliE
 }
 
 impl Proof {
-    /// The findings in the form of the format's issues.
-    pub fn issues(&self) -> Vec<Value> {
-        self.failing.iter().map(issue).collect()
+    /// The lights that fail, the deepest first.
+    pub fn problems(&self) -> Vec<Problem> {
+        self.failing.iter().map(problem).collect()
     }
 
-    /// Lines below the file's own.
-    pub fn lines(&self) -> Vec<String> {
-        let mut lines: Vec<String> = self
-            .failing
-            .iter()
-            .take(SPELT_OUT)
-            .map(|finding| format!("          {}", sentence(finding)))
-            .collect();
-        if self.failing.len() > SPELT_OUT {
-            lines.push(format!("          and {} more; --json lists all", self.failing.len() - SPELT_OUT));
-        }
-        lines
+    /// What was proved, to stand behind the number of lights.
+    pub fn sentence(&self) -> String {
+        format!(
+            ", all behind their surface ({} points; {} lights fail and are tagged)",
+            self.clearance.samples, self.tagged_lights
+        )
     }
 
     /// One line with remedy; `None` if nothing failed.
     pub fn summary(&self, file: &str) -> Option<String> {
         let worst = self.failing.first()?;
         Some(format!(
-            "{file}: {} lights are not behind their surface; the worst: {}; bake again, or tag its object with \
-             `extras.vlm.tag`",
+            "{file}: {} lights are not behind their surface; the worst: {} [{}]; {}",
             self.failing.len(),
-            sentence(worst)
+            sentence(worst),
+            code(worst.kind),
+            code(worst.kind).remedy()
         ))
     }
 }
 
-fn code(kind: FindingKind) -> &'static str {
+fn code(kind: FindingKind) -> Code {
     match kind {
-        FindingKind::LightsItself => "LIGHTS_ITSELF",
-        FindingKind::PokesOut => "POKES_OUT",
-        FindingKind::TooThin => "TOO_THIN",
+        FindingKind::LightsItself => Code::LightsItself,
+        FindingKind::PokesOut => Code::PokesOut,
+        FindingKind::TooThin => Code::TooThin,
     }
 }
 
-fn issue(finding: &Finding) -> Value {
-    json!({
-        "code": code(finding.kind),
-        "severity": "error",
-        "pointer": "/extensions/VLM_virtual_light_mesh/lights",
-        "message": sentence(finding),
-        "light": finding.light,
-        "object": finding.object,
-        "depth_m": finding.depth_m,
-        "place": finding.place.to_array(),
-    })
+fn problem(finding: &Finding) -> Problem {
+    let pointer = format!("/extensions/{EXTENSION}/lights");
+    let light = LightPlace {
+        light: finding.light,
+        object: finding.object.clone(),
+        depth_m: finding.depth_m,
+        place: finding.place.to_array(),
+    };
+    Problem { light: Some(light), ..Issue::error(code(finding.kind), pointer, sentence(finding)).into() }
 }
 
 fn sentence(finding: &Finding) -> String {
@@ -124,10 +110,5 @@ fn sentence(finding: &Finding) -> String {
         _ => format!(", by {:.3} mm", finding.depth_m * 1e3),
     };
     let [x, y, z] = finding.place.to_array();
-    format!(
-        "light {} of `{}` {does}{by}, at ({x:.3}, {y:.3}, {z:.3}) [{}]",
-        finding.light,
-        finding.object,
-        code(finding.kind)
-    )
+    format!("light {} of `{}` {does}{by}, at ({x:.3}, {y:.3}, {z:.3})", finding.light, finding.object)
 }

@@ -12,6 +12,7 @@ use vlm_format::{GltfFile, Settings, VlmAsset, read_vlm_unchecked};
 
 use crate::error::CliError;
 use crate::input::open;
+use crate::inspect_bytes::Bytes;
 use crate::inspect_grid::lines as grid_lines;
 use crate::output::{print, print_json};
 
@@ -48,6 +49,8 @@ pub struct Content {
     partly_tagged_primitives: usize,
     /// Visible nodes that carry a tag as wholes.
     tagged_nodes: usize,
+    /// What each part costs.
+    bytes: Bytes,
     grid: Option<GridContent>,
 }
 
@@ -113,6 +116,7 @@ impl Content {
                 .count(),
             partly_tagged_primitives: asset.triangle_tags.len(),
             tagged_nodes: asset.node_tags.len(),
+            bytes: Bytes::of(file, asset),
             grid: asset.grid.as_ref().map(|grid| GridContent::of(grid).stored_in(file)),
         }
     }
@@ -135,6 +139,7 @@ impl Content {
                 self.partly_tagged_primitives
             ),
         ];
+        lines.extend(self.bytes.lines());
         lines.extend(self.vlms.iter().map(VlmContent::line));
         lines.extend(self.grid.as_ref().map_or_else(|| vec!["grid      none".to_owned()], grid_lines));
         lines

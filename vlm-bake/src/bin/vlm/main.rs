@@ -4,8 +4,11 @@
 //! 2 it could not run.
 
 mod error;
-mod geometry;
 mod input;
+mod files;
+mod problem;
+mod geometry;
+mod sarif;
 mod output;
 mod progress;
 mod settings;
@@ -14,8 +17,11 @@ mod batch;
 mod watch;
 mod check;
 mod inspect;
+mod inspect_bytes;
 mod inspect_grid;
+mod diff;
 mod strip;
+mod relink;
 mod render;
 mod schema;
 mod completions;
@@ -44,8 +50,12 @@ enum Command {
     Check(check::CheckArgs),
     /// Show what is in a file's Virtual Light Meshes
     Inspect(inspect::InspectArgs),
+    /// Tell what changed between two bakes
+    Diff(diff::DiffArgs),
     /// Take the Virtual Light Meshes out of a file
     Strip(strip::StripArgs),
+    /// Attach Virtual Light Meshes again that another tool dropped or renumbered
+    Relink(relink::RelinkArgs),
     /// Render a picture on the CPU
     Render(render::RenderArgs),
     /// Print the JSON Schema of a report, or list those that there are
@@ -62,7 +72,9 @@ fn main() -> ExitCode {
         Command::Watch(args) => watch::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Diff(args) => diff::run(&args),
         Command::Strip(args) => strip::run(&args),
+        Command::Relink(args) => relink::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Schema(args) => schema::run(&args),
         Command::Completions(args) => completions::run(&args),
@@ -70,6 +82,7 @@ fn main() -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
+        Err(CliError::Quiet) => CliError::Quiet.exit_code(),
         Err(error) => {
             eprintln!("error: {error}");
             error.exit_code()

@@ -10,6 +10,7 @@ use vlm_bake::report::Report;
 
 use crate::batch;
 use crate::check;
+use crate::diff;
 use crate::error::CliError;
 use crate::inspect;
 use crate::output::{print, print_json};
@@ -35,6 +36,7 @@ const REPORTS: &[Kind] = &[
     Kind { name: "watch", command: "vlm watch --json, each line", schema: schema_of::<watch::WatchEvent> },
     Kind { name: "check", command: "vlm check --json", schema: schema_of::<Vec<check::Finding>> },
     Kind { name: "inspect", command: "vlm inspect --json", schema: schema_of::<inspect::Content> },
+    Kind { name: "diff", command: "vlm diff --json", schema: schema_of::<diff::DiffReport> },
     Kind { name: "render", command: "vlm render --json", schema: schema_of::<RenderReport> },
 ];
 
