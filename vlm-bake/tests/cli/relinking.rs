@@ -217,9 +217,11 @@ fn a_file_without_anything_to_attach_is_refused() {
     refused(&from, &relinked, &["cornell.glb", "NO_VLM"]);
 }
 
-/// A program of an npm package, where it is installed.
+/// A program of an npm package, where it is installed; its absence fails where `VLM_REQUIRE_NPM=1` promises it.
 fn npm(program: &str) -> Option<PathBuf> {
     let path = PathBuf::from(repository("tests/js/node_modules/.bin")).join(program);
+    let required = std::env::var("VLM_REQUIRE_NPM").is_ok_and(|value| value == "1");
+    assert!(path.exists() || !required, "tests/js has no `{program}` although VLM_REQUIRE_NPM=1");
     if !path.exists() {
         eprintln!("ignored: `{program}` is not among the node modules of tests/js");
     }

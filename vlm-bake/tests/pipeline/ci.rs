@@ -112,7 +112,6 @@ fn the_program_knows_every_command_that_bakes() {
 }
 
 #[test]
-#[ignore = "vlm check has no --sarif yet"]
 fn the_program_knows_every_other_command() {
     for (path, command) in all_commands().into_iter().filter(|(_, command)| command[0] != "bake") {
         let command: Vec<String> =
