@@ -66,7 +66,8 @@ pub enum BakeError {
     NothingReflects,
     /// The budget is too small for any light to be left.
     #[error(
-        "no light is left of the {asked} asked for: the surface falls into pieces too small for them. Ask for more lights"
+        "no light is left of the {asked} asked for: the surface falls into pieces that are too small for so few, or more than \
+         {MAX_ASPECT} times as long as wide. Ask for more lights, or divide long thin triangles"
     )]
     NothingLeft {
         /// The budget.
@@ -107,7 +108,7 @@ pub fn rebake(
         return Err(BakeError::NothingReflects);
     }
     let ground = Ground::new(scene, &patches);
-    let points = ground.points(options.lights as usize);
+    let points = ground.points_of(options.lights as usize, options.least_points);
 
     let shape = memory::of_shape(scene, &patches, options);
     let mend = || mended(scene, options, &ground, &points, &mut clock);

@@ -204,6 +204,8 @@ codes! {
     VlmAspect "VLM_ASPECT" "bake the file again, or split the triangle if you authored it",
     VlmNode "VLM_NODE" "bake the file again, as the last step after every other tool",
     ImageMissing "IMAGE_MISSING" "give the image a uri or a bufferView",
+    Ktx2 "KTX2" "decode the textures first: `npx @gltf-transform/cli ktxdecompress in.glb out.glb`",
+    BufferMissing "BUFFER_MISSING" "give the buffer a uri, or export with the data embedded (.glb)",
 }
 
 impl Serialize for Code {

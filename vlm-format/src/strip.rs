@@ -10,8 +10,8 @@ pub const EXTENSION: &str = "VLM_virtual_light_mesh";
 
 /// Removes all that writing added: extension objects, and the accessors, buffer view and data behind them.
 ///
-/// What is left equals the file before writing, with two exceptions: an `extensions` object that was empty is gone, and
-/// where another tool appended to the file after us, the accessors and data stay, unused.
+/// What is left equals the file before writing, with two exceptions: lists and `extensions` objects that were empty, which
+/// glTF does not allow, are gone, and where another tool appended to the file after us, the accessors and data stay, unused.
 pub(crate) fn strip(parts: &mut Parts) {
     let Some(extension) = remove_extension(&mut parts.json) else { return };
     for pointer in ["/nodes", "/meshes"] {

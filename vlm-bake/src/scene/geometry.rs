@@ -7,8 +7,8 @@ use gltf::Semantic;
 use gltf::mesh::Mode;
 use vlm_format::GltfFile;
 
-/// Most vertices that a scene may have: beyond, its arrays alone take 2 GiB.
-const MAX_VERTICES: usize = 1 << 25;
+/// Most vertices that a scene may have, unless the caller allows others: beyond, its arrays alone take 2 GiB.
+pub(super) const MAX_VERTICES: usize = 1 << 25;
 
 /// A primitive as the file has it, in the mesh's space. All arrays but `triangles` are per vertex.
 #[derive(Clone, Debug, Default)]
@@ -98,11 +98,12 @@ fn triangles(mode: Mode, corners: &[u32]) -> Option<Vec<[u32; 3]>> {
 ///
 /// # Errors
 /// [`Error::NotFinite`] if the transform takes a vertex beyond what `f32` holds, [`Error::TooLarge`] if the scene grows
-/// beyond what the arrays hold.
+/// beyond so many vertices.
 pub(super) fn place(
     scene: &mut Scene,
     local: &LocalMesh,
     placement: &Placement,
+    max_vertices: usize,
     file: &str,
 ) -> Result<usize, Error> {
     let world = world_positions(local, placement, file)?;
@@ -123,8 +124,8 @@ pub(super) fn place(
         triangles =
             (0..).step_by(3).take(triangles.len()).map(|first: u32| [first, first + 1, first + 2]).collect();
     }
-    if scene.positions.len() + source.len() > MAX_VERTICES {
-        return Err(Error::TooLarge { file: file.to_owned(), limit: MAX_VERTICES });
+    if scene.positions.len() + source.len() > max_vertices {
+        return Err(Error::TooLarge { file: file.to_owned(), limit: max_vertices });
     }
     scene.triangle_in_primitive.extend(in_primitive);
     push(scene, local, &world, &source, &triangles, placement);
