@@ -21,6 +21,7 @@ use crate::patches::{Patches, patches};
 use crate::progress::Progress;
 use crate::prove::{accusations, prove};
 use crate::refine::{Refiner, Snap};
+use crate::refusal;
 use crate::render::world_lights;
 use crate::report::{AreaReport, DecimationReport, GridReport, OffsetReport, Report};
 use crate::samples::{BakedLight, Sources, samples};
@@ -32,6 +33,8 @@ use crate::tag::Tags;
 use crate::topology::{Lists, area, aspect_ratio};
 use crate::verify::Verification;
 use crate::write::{order, placeable};
+
+pub use crate::refusal::BakeError;
 
 /// Lights sink by at most this many times the clearance and the mean distance between faces and their surface together. Higher values
 /// hide more lights behind bumpy surface instead of shrinking them, and put all of them deeper there, where they fit their surface less.
@@ -53,29 +56,6 @@ pub struct Bake {
     pub stand_ins: StandIns,
     /// To be shown to the user.
     pub report: Report,
-}
-
-/// Why nothing could be baked.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum BakeError {
-    /// No surface reflects or emits.
-    #[error(
-        "no surface reflects or emits light, so there is nothing to bake: every material is black, blended or transmissive, or \
-         every object is excluded by `extras.vlm`. Give at least one surface an opaque material that is not black"
-    )]
-    NothingReflects,
-    /// The budget is too small for any light to be left.
-    #[error(
-        "no light is left of the {asked} asked for: the surface falls into pieces that are too small for so few, or more than \
-         {MAX_ASPECT} times as long as wide. Ask for more lights, or divide long thin triangles"
-    )]
-    NothingLeft {
-        /// The budget.
-        asked: u32,
-    },
-    /// [`Progress::is_cancelled`] said so.
-    #[error("the bake was cancelled")]
-    Cancelled,
 }
 
 /// Bakes the Virtual Light Meshes of a scene. The result depends on the scene and the options alone, not on the number of
@@ -140,7 +120,7 @@ pub fn rebake(
     let authored_dropped = authored_before - authored_lights(&baked);
     order(&mut baked);
     if baked.is_empty() {
-        return Err(BakeError::NothingLeft { asked: options.lights });
+        return Err(refusal::nothing_left(&patches, &ground, lights.len(), options));
     }
 
     clock.stage("tag")?;

@@ -54,16 +54,28 @@ pub enum Error {
         /// What there is instead, and what to do.
         reason: &'static str,
     },
-    /// A vertex is infinitely far away.
+    /// A vertex is too far away to compute with.
     #[error(
-        "{file}: {pointer}: a vertex lies beyond the range of single precision in world space; apply or correct the \
-         transforms of the nodes that use this mesh"
+        "{file}: {pointer}: a vertex lies farther than {} m from the origin in world space; correct the mesh, or the transforms, skin or \
+         instances of the nodes that use it",
+        geometry::FARTHEST
     )]
-    NotFinite {
+    TooFar {
         /// Name of the file.
         file: String,
         /// JSON pointer of the primitive.
         pointer: String,
+    },
+    /// The scene is too small to compute with.
+    #[error(
+        "{file}: the whole scene is only {extent_m:e} m wide, less than {} m; scale it: glTF's unit is the metre",
+        geometry::NARROWEST
+    )]
+    TooSmall {
+        /// Name of the file.
+        file: String,
+        /// The longest side of the box around all that is drawn, metres.
+        extent_m: f64,
     },
     /// The scene does not fit into the arrays.
     #[error(
@@ -273,6 +285,10 @@ impl<'a> Loader<'a> {
     fn finish(mut self) -> Result<(Scene, Vec<TextureRequest>, Vec<authored::Draft>), Error> {
         if self.scene.triangles.is_empty() {
             return Err(Error::NoTriangles { file: self.file.name().to_owned(), reason: self.why_empty() });
+        }
+        let extent_m = self.scene.bounds().map_or(0.0, |[low, high]| (high - low).max_element());
+        if extent_m < geometry::NARROWEST {
+            return Err(Error::TooSmall { file: self.file.name().to_owned(), extent_m });
         }
         self.add_notes();
         self.scene.materials = self.table.materials;

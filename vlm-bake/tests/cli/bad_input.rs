@@ -159,7 +159,32 @@ fn triangles_too_thin_for_any_light() {
         &[[[0.0, 0.0, 0.0], [1000.0, 0.0, 0.0], [1000.0, 0.01, 0.0], [0.0, 0.01, 0.0]]],
         Some(0),
     );
-    refused("a.gltf", document.to_string(), &["100 times as long as wide", "divide long thin triangles"]);
+    refused("a.gltf", document.to_string(), &["more than 100 times as long as high", "divide them"]);
+}
+
+#[test]
+fn scenes_that_single_precision_cannot_hold() {
+    let scaled = |key: &str, value: serde_json::Value| {
+        let mut document = Document::room();
+        document.json["nodes"][0][key] = value;
+        document.to_string()
+    };
+    let far = &["/meshes/0/primitives/0", "farther than 100000000 m", "correct the mesh"];
+    refused("a.gltf", scaled("scale", json!([1e8, 1e8, 1e8])), far);
+    refused("a.gltf", scaled("translation", json!([1e30, 0, 0])), far);
+    refused("a.gltf", scaled("translation", json!([1e7, 0, 0])), &["move the scene to the origin"]);
+    refused("a.gltf", scaled("scale", json!([1e-12, 1e-12, 1e-12])), &["m wide", "glTF's unit is the metre"]);
+}
+
+#[test]
+fn authored_meshes_that_leave_nothing() {
+    let mut document = Document::room();
+    document.push(
+        "VLM_hole",
+        &[[[-9.0, -9.0, -9.0], [9.0, -9.0, -9.0], [9.0, 9.0, 9.0], [-9.0, 9.0, 9.0]]],
+        None,
+    )["extras"] = json!({ "vlm": { "mode": "subtract" } });
+    refused("a.gltf", document.to_string(), &["authored meshes take all of them away", "smaller"]);
 }
 
 #[test]
