@@ -120,7 +120,7 @@ pub fn rebake(
     let authored_dropped = authored_before - authored_lights(&baked);
     order(&mut baked);
     if baked.is_empty() {
-        return Err(refusal::nothing_left(&patches, &ground, lights.len(), options));
+        return Err(refusal::nothing_left(&ground, lights.len(), options));
     }
 
     clock.stage("tag")?;
@@ -162,8 +162,32 @@ pub(crate) struct Mended {
     distance: Distance,
 }
 
-/// Decimates the surface to the budget, and hides the lights behind it.
+/// The mended lights of the budget. Where the surface falls into so many pieces that none is left within it, of twice the budget and so on,
+/// as long as that lets decimation keep more: the report tells that the budget was missed.
 fn mended(
+    scene: &Scene,
+    options: &BakeOptions,
+    ground: &Ground,
+    points: &[SurfacePoint],
+    clock: &mut Clock,
+) -> Result<Mended, BakeError> {
+    let mut options = options.clone();
+    let mut mended = mended_within(scene, &options, ground, points, clock)?;
+    if !mended.hidden.lights.is_empty() || refusal::no_room(ground).is_some() {
+        return Ok(mended);
+    }
+    // Once some are left, most pieces still have none.
+    while 2 * mended.hidden.lights.len() < options.lights as usize
+        && (options.lights as usize) < 2 * ground.patches.triangles.len()
+    {
+        options.lights = options.lights.saturating_mul(2);
+        mended = mended_within(scene, &options, ground, points, clock)?;
+    }
+    Ok(mended)
+}
+
+/// Decimates the surface to the budget, and hides the lights behind it.
+fn mended_within(
     scene: &Scene,
     options: &BakeOptions,
     ground: &Ground,
@@ -388,7 +412,7 @@ impl<'a> Clock<'a> {
         self.go_on()?;
         if let Some((name, start)) = self.running.take() {
             self.progress.advance(1);
-            self.seconds.insert(name, start.elapsed().as_secs_f64());
+            *self.seconds.entry(name).or_default() += start.elapsed().as_secs_f64();
         }
         Ok(())
     }

@@ -159,7 +159,8 @@ pub fn make(
     let mut bake = rebake(&scene, &options, memory, progress).map_err(refuse)?;
     progress.begin("write", 1);
     let store = WriteOptions { compress: settings.compress.unwrap_or(false) };
-    let outputs = write_vlm_with(file, &bake.asset, target, &store).map_err(|error| unwritten(file, error))?;
+    let outputs =
+        write_vlm_with(file, &bake.asset, target, &store).map_err(|error| unwritten(file, error))?;
     bake.report.hash = hash(&outputs);
     Ok(Made { scene, bake, outputs })
 }
@@ -168,7 +169,10 @@ pub fn make(
 fn unwritten(file: &GltfFile, error: vlm_format::Error) -> JobError {
     match error {
         vlm_format::Error::Asset { issues } => {
-            let issue = issues.into_iter().next().map_or_else(String::new, |i| format!("{}: {}", i.pointer, i.message));
+            let issue = issues
+                .into_iter()
+                .next()
+                .map_or_else(String::new, |i| format!("{}: {}", i.pointer, i.message));
             JobError::Fault { file: PathBuf::from(file.name()), issue }
         }
         other => other.into(),

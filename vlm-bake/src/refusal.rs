@@ -1,8 +1,9 @@
 //! Why nothing could be baked.
 
+use glam::DVec3;
+
 use crate::ground::Ground;
 use crate::options::BakeOptions;
-use crate::patches::Patches;
 use crate::slivers::MAX_ASPECT;
 use crate::topology::aspect_ratio;
 
@@ -32,32 +33,32 @@ pub enum BakeError {
 const LEAST_EXTENT: f64 = 100.0;
 
 /// The refusal of a scene without a light that could be placed; `hidden` is the number of derived ones before authored meshes took some away.
-pub(crate) fn nothing_left(
-    patches: &Patches,
-    ground: &Ground,
-    hidden: usize,
-    options: &BakeOptions,
-) -> BakeError {
-    let (low, high) = patches
-        .positions
-        .iter()
-        .fold((glam::DVec3::INFINITY, glam::DVec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
-    let extent = (high - low).max_element();
-    let thin = |t: usize| aspect_ratio(patches.corners(t)) > MAX_ASPECT;
+pub(crate) fn nothing_left(ground: &Ground, hidden: usize, options: &BakeOptions) -> BakeError {
     let reason = if hidden > 0 {
         "authored meshes take all of them away; make the meshes whose `extras.vlm.mode` is subtract or both smaller".to_owned()
-    } else if extent < LEAST_EXTENT * ground.clearance {
-        format!(
-            "the surface is {extent:.3} m wide, and something so far away that single precision knows places to {:.3} m only; move the \
-             scene to the origin, and remove what lies far from it",
-            ground.clearance
-        )
-    } else if (0..patches.triangles.len()).all(thin) {
-        format!("all triangles are more than {MAX_ASPECT} times as long as high; divide them")
     } else {
-        "the surface falls into pieces that are too small for so few, or too flat to hide any; ask for more lights, or leave out what is \
-         tiny or flattened"
-            .to_owned()
+        no_room(ground).unwrap_or_else(|| {
+            "the surface is too flat, or in pieces too small, to hide any; leave out what is flattened, or ask for more lights".to_owned()
+        })
     };
     BakeError::NothingLeft { asked: options.lights, reason }
+}
+
+/// Why no number of lights fits behind the surface.
+pub(crate) fn no_room(ground: &Ground) -> Option<String> {
+    let patches = ground.patches;
+    let boxed = |(low, high): (DVec3, DVec3), &place: &DVec3| (low.min(place), high.max(place));
+    let (low, high) = patches.positions.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), boxed);
+    let extent = (high - low).max_element();
+    if extent < LEAST_EXTENT * ground.clearance {
+        return Some(format!(
+            "the surface is {extent:.3} m wide, but all that is drawn reaches so far that single precision knows places to {:.3} m; move the \
+             scene to the origin, and remove what lies far from it",
+            ground.clearance
+        ));
+    }
+    let thin = |t: usize| aspect_ratio(patches.corners(t)) > MAX_ASPECT;
+    (0..patches.triangles.len())
+        .all(thin)
+        .then(|| format!("all triangles are more than {MAX_ASPECT} times as long as high; divide them"))
 }

@@ -113,7 +113,10 @@ impl BakeSettings {
     #[must_use]
     pub fn load_options(&self) -> LoadOptions<'static> {
         let usual = LoadOptions::default();
-        LoadOptions { max_vertices: self.max_vertices.map_or(usual.max_vertices, |most| most as usize), ..usual }
+        LoadOptions {
+            max_vertices: self.max_vertices.map_or(usual.max_vertices, |most| most as usize),
+            ..usual
+        }
     }
 
     /// Each wish as `key value`, for people to read: what changed, say.
