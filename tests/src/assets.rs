@@ -1,6 +1,6 @@
 //! Where the scenes and odd files are that tests run on; they are not part of the repository.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A file or folder of the test assets, `VLM_ASSETS` first, then `../shared/assets` beside the repository.
 ///
@@ -17,6 +17,25 @@ pub fn find(relative: &str) -> Option<PathBuf> {
 #[must_use]
 pub fn look(relative: &str) -> Option<PathBuf> {
     roots().map(|root| root.join(relative)).find(|path| path.exists())
+}
+
+/// The .glb and .gltf files of a folder and those below it, by path.
+#[must_use]
+pub fn gltf_files(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    collect(folder, &mut found);
+    found.sort();
+    found
+}
+
+fn collect(folder: &Path, found: &mut Vec<PathBuf>) {
+    for path in folder.read_dir().into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path())) {
+        if path.is_dir() {
+            collect(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "glb" || extension == "gltf") {
+            found.push(path);
+        }
+    }
 }
 
 /// The folders in which assets may be, in the order in which they are asked.

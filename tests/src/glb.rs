@@ -83,22 +83,7 @@ impl Glb {
         self.json["buffers"] = json!([{ "byteLength": self.bin.len() }]);
         self.json["bufferViews"] = Value::Array(self.views);
         self.json["accessors"] = Value::Array(self.accessors);
-        let mut text = self.json.to_string().into_bytes();
-        text.resize(text.len().next_multiple_of(4), b' ');
-        self.bin.resize(self.bin.len().next_multiple_of(4), 0);
-
-        let total = 12 + 8 + text.len() + 8 + self.bin.len();
-        let mut glb = Vec::with_capacity(total);
-        glb.extend(b"glTF");
-        push_u32(&mut glb, 2);
-        push_u32(&mut glb, total);
-        push_u32(&mut glb, text.len());
-        glb.extend(b"JSON");
-        glb.extend(text);
-        push_u32(&mut glb, self.bin.len());
-        glb.extend(b"BIN\0");
-        glb.extend(self.bin);
-        glb
+        container(&self.json, &self.bin)
     }
 
     fn push_vec3(&mut self, values: &[[f32; 3]], bounds: bool) -> usize {
@@ -142,6 +127,28 @@ impl Glb {
         self.bin.extend(bytes);
         self.views.len() - 1
     }
+}
+
+/// A GLB of these two chunks, padded to four bytes.
+#[must_use]
+pub fn container(json: &Value, bin: &[u8]) -> Vec<u8> {
+    let mut text = json.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let padded = bin.len().next_multiple_of(4);
+
+    let total = 12 + 8 + text.len() + 8 + padded;
+    let mut glb = Vec::with_capacity(total);
+    glb.extend(b"glTF");
+    push_u32(&mut glb, 2);
+    push_u32(&mut glb, total);
+    push_u32(&mut glb, text.len());
+    glb.extend(b"JSON");
+    glb.extend(text);
+    push_u32(&mut glb, padded);
+    glb.extend(b"BIN\0");
+    glb.extend(bin);
+    glb.resize(total, 0);
+    glb
 }
 
 fn push_u32(bytes: &mut Vec<u8>, value: usize) {

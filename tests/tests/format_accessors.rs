@@ -136,3 +136,17 @@ fn claims_beyond_the_data_are_refused() {
     let bomb = json!({ "extensions": { "EXT_meshopt_compression": codec } });
     assert_eq!(code(file(&[0; 24], bomb, accessor(1 << 20))), Code::AccessorTooLarge);
 }
+
+/// Found by fuzzing: what was appended to such a file seemed to belong to the view, and stripping left it behind.
+#[test]
+fn the_place_of_a_decoded_view_lies_inside_its_buffer() {
+    let view = |offset: u32| {
+        let codec = json!({
+            "buffer": 0, "byteLength": 24, "byteStride": 12, "count": 2, "mode": "ATTRIBUTES", "filter": "NONE",
+        });
+        json!({ "byteOffset": offset, "extensions": { "EXT_meshopt_compression": codec } })
+    };
+    let accessor = json!({ "bufferView": 0, "componentType": 5126, "count": 2, "type": "VEC3" });
+    assert!(file(&[0; 24], view(0), accessor.clone()).is_ok());
+    assert_eq!(code(file(&[0; 24], view(12), accessor)), Code::ViewOutOfRange);
+}

@@ -3,24 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "what cannot be unwrapped fails the test")]
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use vlm_format::{Error, GltfFile};
-
-fn glb_and_gltf_files(folder: &Path, found: &mut Vec<PathBuf>) {
-    let mut entries: Vec<PathBuf> =
-        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    entries.sort();
-    for path in entries {
-        if path.is_dir() {
-            glb_and_gltf_files(&path, found);
-        } else if path.extension().is_some_and(|extension| extension == "glb" || extension == "gltf") {
-            found.push(path);
-        }
-    }
-}
 
 /// Opens a file and decodes everything that it holds.
 fn decode_all(path: &Path) -> Result<(), Error> {
@@ -60,8 +46,7 @@ fn decode_all(path: &Path) -> Result<(), Error> {
 #[cfg_attr(not(has_corpus), ignore = "the corpus is neither in VLM_ASSETS nor in ../shared/assets")]
 fn every_file_opens_or_is_refused_with_reason_and_remedy() {
     let Some(corpus) = vlm_tests::assets::find("corpus") else { return };
-    let mut files = Vec::new();
-    glb_and_gltf_files(&corpus, &mut files);
+    let files = vlm_tests::assets::gltf_files(&corpus);
     assert!(files.len() >= 234, "only {} files in the corpus", files.len());
 
     let mut outcomes: BTreeMap<String, Vec<String>> = BTreeMap::new();

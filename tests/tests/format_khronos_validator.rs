@@ -2,11 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "what cannot be unwrapped fails the test")]
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::PathBuf;
 
 use serde_json::{Value, json};
 use vlm_format::{Container, GltfFile, Target, WriteOptions, write_atomic, write_vlm_with};
+use vlm_tests::khronos::{errors, has_validator, validate};
 use vlm_tests::{assets, sample_asset};
 
 /// Files that are valid as they are.
@@ -24,27 +24,6 @@ const CONTAINERS: [(Container, &str); 3] = [
     (Container::Gltf { embedded: false }, "out.gltf"),
     (Container::Gltf { embedded: true }, "embedded.gltf"),
 ];
-
-/// True if the node modules are there. Without them the tests are ignored, or fail where `VLM_REQUIRE_NPM=1` promises
-/// that they are.
-fn has_validator() -> bool {
-    let found = Path::new(env!("CARGO_MANIFEST_DIR")).join("js/node_modules/gltf-validator").is_dir();
-    let required = std::env::var("VLM_REQUIRE_NPM").is_ok_and(|value| value == "1");
-    assert!(found || !required, "tests/js has no node_modules although VLM_REQUIRE_NPM=1");
-    found
-}
-
-/// The validator's report on each file.
-fn validate(files: &[PathBuf]) -> Vec<Value> {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("js/validate.mjs");
-    let output = Command::new("node").arg(script).args(files).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap()
-}
-
-fn errors(report: &Value) -> Vec<&Value> {
-    report["messages"].as_array().unwrap().iter().filter(|message| message["severity"] == 0).collect()
-}
 
 #[test]
 #[cfg_attr(not(has_corpus), ignore = "the corpus is neither in VLM_ASSETS nor in ../shared/assets")]
@@ -110,5 +89,5 @@ fn a_broken_file_has_errors() {
 
 #[test]
 fn the_validator_is_there_where_it_is_promised() {
-    has_validator();
+    _ = has_validator();
 }

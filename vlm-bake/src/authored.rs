@@ -115,7 +115,7 @@ impl AuthoredLights<'_> {
         let mut triangles: Vec<u32> = lit.map(|(point, _)| point.triangle).collect();
         triangles.sort_unstable();
         triangles.dedup();
-        let strength = steering.tint * steering.intensity;
+        let strength = steering.strength();
         let painted = self.mesh.albedo.as_ref().map(|albedo| albedo[triangle]);
         let mean = || own.iter().map(|(_, albedo)| *albedo).sum::<Vec3>() / own.len().max(1) as f32;
         let accused = Accusation { triangles, reason: TagReason::Uncleared };

@@ -21,6 +21,7 @@ use crate::patches::{Patches, patches};
 use crate::progress::Progress;
 use crate::prove::{accusations, prove};
 use crate::refine::{Refiner, Snap};
+use crate::refusal;
 use crate::render::world_lights;
 use crate::report::{AreaReport, DecimationReport, GridReport, OffsetReport, Report};
 use crate::samples::{BakedLight, Sources, samples};
@@ -32,6 +33,8 @@ use crate::tag::Tags;
 use crate::topology::{Lists, area, aspect_ratio};
 use crate::verify::Verification;
 use crate::write::{order, placeable};
+
+pub use crate::refusal::BakeError;
 
 /// Lights sink by at most this many times the clearance and the mean distance between faces and their surface together. Higher values
 /// hide more lights behind bumpy surface instead of shrinking them, and put all of them deeper there, where they fit their surface less.
@@ -53,28 +56,6 @@ pub struct Bake {
     pub stand_ins: StandIns,
     /// To be shown to the user.
     pub report: Report,
-}
-
-/// Why nothing could be baked.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum BakeError {
-    /// No surface reflects or emits.
-    #[error(
-        "no surface reflects or emits light, so there is nothing to bake: every material is black, blended or transmissive, or \
-         every object is excluded by `extras.vlm`. Give at least one surface an opaque material that is not black"
-    )]
-    NothingReflects,
-    /// The budget is too small for any light to be left.
-    #[error(
-        "no light is left of the {asked} asked for: the surface falls into pieces too small for them. Ask for more lights"
-    )]
-    NothingLeft {
-        /// The budget.
-        asked: u32,
-    },
-    /// [`Progress::is_cancelled`] said so.
-    #[error("the bake was cancelled")]
-    Cancelled,
 }
 
 /// Bakes the Virtual Light Meshes of a scene. The result depends on the scene and the options alone, not on the number of
@@ -107,7 +88,7 @@ pub fn rebake(
         return Err(BakeError::NothingReflects);
     }
     let ground = Ground::new(scene, &patches);
-    let points = ground.points(options.lights as usize);
+    let points = ground.points_of(options.lights as usize, options.least_points);
 
     let shape = memory::of_shape(scene, &patches, options);
     let mend = || mended(scene, options, &ground, &points, &mut clock);
@@ -139,7 +120,7 @@ pub fn rebake(
     let authored_dropped = authored_before - authored_lights(&baked);
     order(&mut baked);
     if baked.is_empty() {
-        return Err(BakeError::NothingLeft { asked: options.lights });
+        return Err(refusal::nothing_left(&ground, lights.len(), options));
     }
 
     clock.stage("tag")?;
@@ -181,8 +162,32 @@ pub(crate) struct Mended {
     distance: Distance,
 }
 
-/// Decimates the surface to the budget, and hides the lights behind it.
+/// The mended lights of the budget. Where the surface falls into so many pieces that none is left within it, of twice the budget and so on,
+/// as long as that lets decimation keep more: the report tells that the budget was missed.
 fn mended(
+    scene: &Scene,
+    options: &BakeOptions,
+    ground: &Ground,
+    points: &[SurfacePoint],
+    clock: &mut Clock,
+) -> Result<Mended, BakeError> {
+    let mut options = options.clone();
+    let mut mended = mended_within(scene, &options, ground, points, clock)?;
+    if !mended.hidden.lights.is_empty() || refusal::no_room(ground).is_some() {
+        return Ok(mended);
+    }
+    // Once some are left, most pieces still have none.
+    while 2 * mended.hidden.lights.len() < options.lights as usize
+        && (options.lights as usize) < 2 * ground.patches.triangles.len()
+    {
+        options.lights = options.lights.saturating_mul(2);
+        mended = mended_within(scene, &options, ground, points, clock)?;
+    }
+    Ok(mended)
+}
+
+/// Decimates the surface to the budget, and hides the lights behind it.
+fn mended_within(
     scene: &Scene,
     options: &BakeOptions,
     ground: &Ground,
@@ -407,7 +412,7 @@ impl<'a> Clock<'a> {
         self.go_on()?;
         if let Some((name, start)) = self.running.take() {
             self.progress.advance(1);
-            self.seconds.insert(name, start.elapsed().as_secs_f64());
+            *self.seconds.entry(name).or_default() += start.elapsed().as_secs_f64();
         }
         Ok(())
     }

@@ -147,7 +147,7 @@ fn sent_by_lights(scene: &Scene, lights: &[BakedLight]) -> Vec<Sent> {
 pub fn steer(scene: &Scene, lights: &mut [BakedLight]) {
     for light in lights {
         let steering = &scene.objects[light.object as usize].steering;
-        let strength = steering.tint * steering.intensity;
+        let strength = steering.strength();
         light.samples.iter_mut().for_each(|s| s.reflectance *= strength);
         light.emission *= strength;
     }

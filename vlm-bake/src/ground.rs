@@ -14,8 +14,8 @@ use crate::way_out::WayOut;
 /// decimation left out, by lights farther from it.
 const REACH_SHARE: f64 = 0.15;
 
-/// The least number of area-uniform points of the check.
-const LEAST_POINTS: usize = 200_000;
+/// The least number of area-uniform points of the check, unless the options of a bake ask for another.
+pub const LEAST_POINTS: u32 = 200_000;
 
 /// The inner place of a point on an edge is at most so many clearances inside its triangle. Higher values leave the last bit of a
 /// surface to its neighbour; lower values find a light across the edge, whose vertices moved along it.
@@ -62,7 +62,13 @@ impl<'a> Ground<'a> {
     /// areas of a triangle's points sum to its own.
     #[must_use]
     pub fn points(&self, lights: usize) -> Vec<SurfacePoint> {
-        let count = (lights * POINTS_PER_LIGHT).max(LEAST_POINTS);
+        self.points_of(lights, LEAST_POINTS)
+    }
+
+    /// [`Ground::points`] with another number of area-uniform points at least.
+    #[must_use]
+    pub fn points_of(&self, lights: usize, least: u32) -> Vec<SurfacePoint> {
+        let count = (lights * POINTS_PER_LIGHT).max(least as usize);
         let mut points = spread_points(self.patches, count);
         points.extend(feature_points(self.patches));
         share_area(self.patches, &mut points);

@@ -89,6 +89,17 @@ pub enum JobError {
         /// What the bake says.
         error: BakeError,
     },
+    /// What was made breaks a rule of the format.
+    #[error(
+        "{}: {issue}: what was baked is not valid, which is a fault of this tool; please report it, with the file",
+        file.display()
+    )]
+    Fault {
+        /// The input.
+        file: PathBuf,
+        /// The first rule that was broken, and where.
+        issue: String,
+    },
     /// The cache cannot be used.
     #[error(transparent)]
     Cache(#[from] CacheError),
@@ -141,15 +152,31 @@ pub fn make(
         }
         progress.advance(1);
     };
-    let scene = load(file, &LoadOptions { on_texture: Some(&on_texture), ..LoadOptions::default() })?;
+    let limits = LoadOptions { on_texture: Some(&on_texture), ..settings.load_options() };
+    let scene = load(file, &limits)?;
     let refuse = |error| JobError::Bake { file: PathBuf::from(file.name()), error };
     let options = settings.options(scene.triangles.len());
     let mut bake = rebake(&scene, &options, memory, progress).map_err(refuse)?;
     progress.begin("write", 1);
     let store = WriteOptions { compress: settings.compress.unwrap_or(false) };
-    let outputs = write_vlm_with(file, &bake.asset, target, &store)?;
+    let outputs =
+        write_vlm_with(file, &bake.asset, target, &store).map_err(|error| unwritten(file, error))?;
     bake.report.hash = hash(&outputs);
     Ok(Made { scene, bake, outputs })
+}
+
+/// What the baker made is checked as it is written.
+fn unwritten(file: &GltfFile, error: vlm_format::Error) -> JobError {
+    match error {
+        vlm_format::Error::Asset { issues } => {
+            let issue = issues
+                .into_iter()
+                .next()
+                .map_or_else(String::new, |i| format!("{}: {}", i.pointer, i.message));
+            JobError::Fault { file: PathBuf::from(file.name()), issue }
+        }
+        other => other.into(),
+    }
 }
 
 /// BLAKE3 of everything written, in the order of writing.

@@ -12,6 +12,7 @@ pub mod flags;
 pub mod progress;
 pub mod report;
 
+pub mod refusal;
 pub mod bake;
 pub mod memory;
 pub mod scene;

@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::flags::FlagError;
-use crate::grid::GridOptions;
+use crate::grid::{GridOptions, LEAST_PLACES};
+use crate::ground::LEAST_POINTS;
 
 /// What a bake costs and how fine it is. Start from [`BakeOptions::preset`] and change what you need.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,6 +26,9 @@ pub struct BakeOptions {
     /// Points tested per light by `verify`, and the pool from which the samples are drawn. Higher values find smaller
     /// violations; bake time grows in proportion.
     pub tests_per_light: u32,
+    /// At least so many points, spread evenly over the surface, by which lights are placed and the finished asset is proven, whatever the
+    /// number of lights. Fewer of them bake small scenes faster, and miss small places where a light shows.
+    pub least_points: u32,
     /// The static grid.
     pub grid: GridOptions,
 }
@@ -95,7 +99,8 @@ impl BakeOptions {
             free_error: 2e-4,
             samples,
             tests_per_light: 20,
-            grid: GridOptions { probes, rays, near, cell_size: None },
+            least_points: LEAST_POINTS,
+            grid: GridOptions { probes, rays, near, cell_size: None, least_places: LEAST_PLACES },
         }
     }
 }

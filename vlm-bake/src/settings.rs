@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::grid::GridOptions;
 use crate::options::{BakeOptions, Preset};
+use crate::scene::LoadOptions;
 
 /// Wishes about a bake; `None` leaves a value to the preset. [`BakeSettings::options`] makes them whole for a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -27,6 +28,9 @@ pub struct BakeSettings {
     /// The most near lights of a probe, at most 4,096. See [`GridOptions::near`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub near: Option<u32>,
+    /// Scenes with more vertices are refused, 1 at least. See [`LoadOptions::max_vertices`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_vertices: Option<u32>,
     /// Compress what is added to the file, without loss.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub compress: Option<bool>,
@@ -58,6 +62,7 @@ impl BakeSettings {
             probes: self.probes.or(base.probes),
             rays: self.rays.or(base.rays),
             near: self.near.or(base.near),
+            max_vertices: self.max_vertices.or(base.max_vertices),
             compress: self.compress.or(base.compress),
             skip: self.skip.or(base.skip),
         }
@@ -78,6 +83,7 @@ impl BakeSettings {
         whole("probes", self.probes, 0, 1_000_000, "a whole number from 0 to 1000000")?;
         whole("rays", self.rays, 1, 65_536, "a whole number from 1 to 65536")?;
         whole("near", self.near, 0, 4_096, "a whole number from 0 to 4096")?;
+        whole("max_vertices", self.max_vertices, 1, u32::MAX, "a whole number above 0")?;
         match self.cell {
             Some(cell) if !(cell.is_finite() && cell > 0.0) => {
                 Err(OutOfRange { key: "cell", value: f64::from(cell), range: "a number of metres above 0" })
@@ -97,8 +103,19 @@ impl BakeSettings {
                 rays: self.rays.unwrap_or(preset.grid.rays),
                 near: self.near.unwrap_or(preset.grid.near),
                 cell_size: self.cell,
+                ..preset.grid
             },
             ..preset
+        }
+    }
+
+    /// How the scene is read for it.
+    #[must_use]
+    pub fn load_options(&self) -> LoadOptions<'static> {
+        let usual = LoadOptions::default();
+        LoadOptions {
+            max_vertices: self.max_vertices.map_or(usual.max_vertices, |most| most as usize),
+            ..usual
         }
     }
 

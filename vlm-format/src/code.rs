@@ -105,6 +105,8 @@ codes! {
     VlmAspect "VLM_ASPECT" ERROR "a light is longer than 100 times its height" "bake the file again, or split the triangle if you authored it",
     VlmNode "VLM_NODE" ERROR "a Virtual Light Mesh names a node or primitive that does not exist" "bake the file again, as the last step after every other tool",
     ImageMissing "IMAGE_MISSING" ERROR "an image has no data" "give the image a uri or a bufferView",
+    Ktx2 "KTX2" ERROR "textures are compressed as KTX2, which is not read" "decode the textures first: `npx @gltf-transform/cli ktxdecompress in.glb out.glb`",
+    BufferMissing "BUFFER_MISSING" ERROR "a buffer has no data" "give the buffer a uri, or export with the data embedded (.glb)",
     NoVlm "NO_VLM" ERROR "the file has no Virtual Light Mesh" "bake it, as the last step after every other tool",
     Stale "STALE" ERROR "the Virtual Light Mesh no longer fits the file around it" "bake again, as the last step after every other tool; where only the extension was lost or renumbered, `vlm relink` attaches it again",
     NotInSource "NOT_IN_SOURCE" ERROR "a node bears lights, but the source has no geometry there" "name the file that was baked, or bake again",

@@ -291,8 +291,13 @@ fn usable_bytes(json: &Value, bin: Option<&[u8]>, buffers: &[Vec<u8>]) -> Result
     let mut usable = Vec::new();
     for (i, (buffer, data)) in array(json, "/buffers").iter().zip(buffers).enumerate() {
         let is_bin = i == 0 && buffer.get("uri").is_none();
-        let available = if is_bin { bin.map_or(0, <[u8]>::len) } else { data.len() } as u64;
         let promised = count(buffer, "byteLength").unwrap_or_default();
+        if is_bin && bin.is_none() && promised > 0 && !is_fallback(buffer) {
+            let message =
+                format!("the buffer has no uri, and there is no BIN chunk for its {promised} bytes");
+            return Err(Issue::error(Code::BufferMissing, format!("/buffers/{i}"), message));
+        }
+        let available = if is_bin { bin.map_or(0, <[u8]>::len) } else { data.len() } as u64;
         if available < promised && !is_fallback(buffer) {
             let message = format!("the buffer has {available} bytes of the {promised} that it promises");
             return Err(Issue::error(Code::BufferShort, format!("/buffers/{i}"), message));

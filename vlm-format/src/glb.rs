@@ -62,6 +62,9 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Glb<'_>, Issue> {
     }
 
     let mut chunks = chunks.into_iter().peekable();
+    if chunks.peek().is_none() {
+        return Err(damaged(format!("the GLB header promises {length} bytes, too few for a chunk")));
+    }
     let Some((_, json)) = chunks.next_if(|chunk| chunk.0 == CHUNK_JSON) else {
         return Err(damaged(String::from("the first chunk of the GLB is not JSON")));
     };

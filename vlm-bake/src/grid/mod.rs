@@ -26,6 +26,7 @@ mod transport;
 mod tree;
 mod uncovered;
 
+pub use pool::LEAST_PLACES;
 pub use stand_in::StandIns;
 pub use transport::transport;
 pub use uncovered::Pieces;
@@ -55,6 +56,8 @@ pub struct GridOptions {
     pub near: u32,
     /// Edge of the coarsest cells, metres; `None` chooses one that suits the scene.
     pub cell_size: Option<f32>,
+    /// At least so many places on surface are candidates for probes. Fewer of them build small grids faster, and place probes less evenly.
+    pub least_places: u32,
 }
 
 /// What the builder starts from.
@@ -93,7 +96,7 @@ pub fn grid(input: &GridInput, options: &GridOptions, progress: &dyn Progress) -
     if input.lights.is_empty() || options.probes == 0 {
         return None;
     }
-    let mut pool = pool::pool(input.trace, options.probes);
+    let mut pool = pool::pool(input.trace, options.probes, options.least_places);
     let rough = GridOptions {
         probes: (options.probes as f32 * ROUGH_PROBES) as u32,
         rays: (options.rays as f32 * ROUGH_RAYS) as u32,

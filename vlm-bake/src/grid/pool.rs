@@ -12,8 +12,8 @@ use crate::topology::area;
 /// Places per probe. Higher values place probes more evenly and find smaller surfaces; each takes [`LOOKS`] rays.
 const PLACES_PER_PROBE: u32 = 10;
 
-/// At least so many places.
-const LEAST_PLACES: u32 = 40_000;
+/// At least so many places, unless the options ask for another number.
+pub const LEAST_PLACES: u32 = 40_000;
 
 /// Rays by which a place looks around.
 const LOOKS: u32 = 24;
@@ -34,14 +34,14 @@ pub struct Place {
 
 /// Spreads places over all visible surface, and leaves out those that lie inside of something.
 #[must_use]
-pub fn pool(trace: &TraceScene, probes: u32) -> Vec<Place> {
+pub fn pool(trace: &TraceScene, probes: u32, least: u32) -> Vec<Place> {
     let scene = trace.scene;
     let corners = |t: usize| scene.corners(t).unwrap_or_default().map(Vec3::as_dvec3);
     let areas: Vec<f64> = (0..scene.triangles.len())
         .into_par_iter()
         .map(|t| if trace.lit_sides(t as u32)[0] { area(corners(t)) } else { 0.0 })
         .collect();
-    let count = probes.saturating_mul(PLACES_PER_PROBE).max(LEAST_PLACES);
+    let count = probes.saturating_mul(PLACES_PER_PROBE).max(least);
     let (drawn, step) = area_steps(&areas, count as usize);
     let looked = drawn.par_iter().enumerate().flat_map_iter(|(i, &triangle)| {
         let barycentric = off_edges(uniform_barycentric(i as u64));

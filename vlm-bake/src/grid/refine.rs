@@ -106,7 +106,9 @@ fn add_errors(
         let gathered = luminance(frame.gather(&place.surface.receiver(0)).irradiance);
         let error = gathered - exact.irradiance;
         let there = gathered.max(exact.irradiance) * (1.0 - DARKEST) + mean * DARKEST;
-        *squared += (error * error - exact.variance).max(0.0) / (there * there);
+        let relative = (error * error - exact.variance).max(0.0) / (there * there);
+        // Lights may be so strong that squares leave single precision; then they tell nothing.
+        *squared += if relative.is_finite() { relative } else { 0.0 };
     });
 }
 

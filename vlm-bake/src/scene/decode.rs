@@ -42,14 +42,24 @@ pub(super) fn textures(
     for ((image, numbers), result) in images.iter().zip(decoded) {
         match result {
             Ok(built) => numbers.iter().zip(built).for_each(|(&number, texture)| textures[number] = texture),
-            Err(reason) => notes.push(format!("/images/{image}: {reason}; read as white")),
+            Err(reason) => notes.push(format!("/images/{image}: read as white: {reason}")),
         }
     }
     textures.into_iter().map(|texture| texture.unwrap_or_else(Texture::white)).collect()
 }
 
+/// What is wrong, without the name of the file, which all notes are about.
+fn cause(error: &vlm_format::Error) -> String {
+    match error {
+        vlm_format::Error::Invalid { issues, .. } => issues
+            .first()
+            .map_or_else(String::new, |issue| format!("{}; {}", issue.message, issue.code.remedy())),
+        other => other.to_string(),
+    }
+}
+
 fn decode(file: &GltfFile, image: usize) -> Result<RgbaImage, String> {
-    let bytes = file.image_bytes(image).map_err(|error| error.to_string())?;
+    let bytes = file.image_bytes(image).map_err(|error| cause(&error))?;
     let mut reader = ImageReader::new(Cursor::new(bytes.as_ref()))
         .with_guessed_format()
         .map_err(|error| error.to_string())?;

@@ -7,8 +7,15 @@ use gltf::Semantic;
 use gltf::mesh::Mode;
 use vlm_format::GltfFile;
 
-/// Most vertices that a scene may have: beyond, its arrays alone take 2 GiB.
-const MAX_VERTICES: usize = 1 << 25;
+/// Most vertices that a scene may have, unless the caller allows others: beyond, its arrays alone take 2 GiB.
+pub(super) const MAX_VERTICES: usize = 1 << 25;
+
+/// Coordinates in world space are at most so large, metres: the fourth power of a length, as in squared areas, is then a number in single
+/// precision with room to spare.
+pub(super) const FARTHEST: f32 = 1e8;
+
+/// The whole scene is at least so wide, metres. Below, areas and their squares vanish in single precision.
+pub(super) const NARROWEST: f64 = 1e-6;
 
 /// A primitive as the file has it, in the mesh's space. All arrays but `triangles` are per vertex.
 #[derive(Clone, Debug, Default)]
@@ -67,7 +74,10 @@ pub(super) fn read(
         emissive_uvs: texture_uvs(uvs.emissive)?,
         normals: normals.filter(|normals| whole(normals.len())),
         colors: colors.filter(|colors| whole(colors.len())).map(|colors| {
-            colors.into_iter().map(|color| finite_or(color.truncate(), Vec3::ONE).max(Vec3::ZERO)).collect()
+            colors
+                .into_iter()
+                .map(|color| finite_or(color.truncate(), Vec3::ONE).clamp(Vec3::ZERO, Vec3::ONE))
+                .collect()
         }),
         positions,
         triangles,
@@ -97,12 +107,13 @@ fn triangles(mode: Mode, corners: &[u32]) -> Option<Vec<[u32; 3]>> {
 /// Appends a primitive to the scene and returns how many of its triangles were left out because they have no area.
 ///
 /// # Errors
-/// [`Error::NotFinite`] if the transform takes a vertex beyond what `f32` holds, [`Error::TooLarge`] if the scene grows
-/// beyond what the arrays hold.
+/// [`Error::TooFar`] if the transform takes a vertex beyond [`FARTHEST`], [`Error::TooLarge`] if the scene grows
+/// beyond so many vertices.
 pub(super) fn place(
     scene: &mut Scene,
     local: &LocalMesh,
     placement: &Placement,
+    max_vertices: usize,
     file: &str,
 ) -> Result<usize, Error> {
     let world = world_positions(local, placement, file)?;
@@ -123,8 +134,8 @@ pub(super) fn place(
         triangles =
             (0..).step_by(3).take(triangles.len()).map(|first: u32| [first, first + 1, first + 2]).collect();
     }
-    if scene.positions.len() + source.len() > MAX_VERTICES {
-        return Err(Error::TooLarge { file: file.to_owned(), limit: MAX_VERTICES });
+    if scene.positions.len() + source.len() > max_vertices {
+        return Err(Error::TooLarge { file: file.to_owned(), limit: max_vertices });
     }
     scene.triangle_in_primitive.extend(in_primitive);
     push(scene, local, &world, &source, &triangles, placement);
@@ -134,7 +145,7 @@ pub(super) fn place(
 /// The vertices in world space.
 ///
 /// # Errors
-/// [`Error::NotFinite`] if the transform takes one beyond what `f32` holds.
+/// [`Error::TooFar`] if the transform takes one beyond [`FARTHEST`].
 pub(super) fn world_positions(
     local: &LocalMesh,
     placement: &Placement,
@@ -142,10 +153,10 @@ pub(super) fn world_positions(
 ) -> Result<Vec<Vec3>, Error> {
     let place = |p: &Vec3| placement.world_from_local.transform_point3(p.as_dvec3()).as_vec3();
     let world: Vec<Vec3> = local.positions.iter().map(place).collect();
-    if world.iter().all(|p| p.is_finite()) {
+    if world.iter().all(|p| p.is_finite() && p.abs().max_element() <= FARTHEST) {
         return Ok(world);
     }
-    Err(Error::NotFinite {
+    Err(Error::TooFar {
         file: file.to_owned(),
         pointer: format!("/meshes/{}/primitives/{}", placement.mesh, placement.primitive),
     })

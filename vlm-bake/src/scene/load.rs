@@ -18,13 +18,16 @@ pub struct LoadOptions<'a> {
     /// changes pictures taken from close by and nothing else. Higher values cost memory: 2048 takes up to 27 MiB a
     /// texture, 4096 four times that.
     pub max_texture_side: u32,
+    /// Scenes with more vertices, every instance counted, are refused. A vertex takes about 64 bytes here and several times that in a
+    /// bake.
+    pub max_vertices: usize,
     /// Called from any thread when a texture is done: how many are, and of how many.
     pub on_texture: Option<&'a (dyn Fn(usize, usize) + Sync)>,
 }
 
 impl Default for LoadOptions<'_> {
     fn default() -> Self {
-        Self { max_texture_side: 2048, on_texture: None }
+        Self { max_texture_side: 2048, max_vertices: geometry::MAX_VERTICES, on_texture: None }
     }
 }
 
@@ -51,20 +54,33 @@ pub enum Error {
         /// What there is instead, and what to do.
         reason: &'static str,
     },
-    /// A vertex is infinitely far away.
+    /// A vertex is too far away to compute with.
     #[error(
-        "{file}: {pointer}: a vertex lies beyond the range of single precision in world space; apply or correct the \
-         transforms of the nodes that use this mesh"
+        "{file}: {pointer}: a vertex lies farther than {} m from the origin in world space; correct the mesh, or the transforms, skin or \
+         instances of the nodes that use it",
+        geometry::FARTHEST
     )]
-    NotFinite {
+    TooFar {
         /// Name of the file.
         file: String,
         /// JSON pointer of the primitive.
         pointer: String,
     },
+    /// The scene is too small to compute with.
+    #[error(
+        "{file}: the whole scene is only {extent_m:e} m wide, less than {} m; scale it: glTF's unit is the metre",
+        geometry::NARROWEST
+    )]
+    TooSmall {
+        /// Name of the file.
+        file: String,
+        /// The longest side of the box around all that is drawn, metres.
+        extent_m: f64,
+    },
     /// The scene does not fit into the arrays.
     #[error(
-        "{file}: the scene has more than {limit} vertices once every instance is placed; bake it in parts"
+        "{file}: the scene has more than {limit} vertices once every instance is placed; bake it in parts, or allow more where there \
+         is memory for them (--max-vertices)"
     )]
     TooLarge {
         /// Name of the file.
@@ -95,7 +111,7 @@ pub enum Error {
 /// [`Error`] says which.
 pub fn load(file: &GltfFile, options: &LoadOptions) -> Result<Scene, Error> {
     let nodes = node::drawn_nodes(file);
-    let mut loader = Loader::new(file, &nodes);
+    let mut loader = Loader::new(file, &nodes, options.max_vertices);
     for (index, placed) in nodes.iter().enumerate() {
         if let Some(mesh) = placed.node.mesh() {
             loader.add_object(index, placed, &mesh)?;
@@ -113,6 +129,7 @@ pub fn load(file: &GltfFile, options: &LoadOptions) -> Result<Scene, Error> {
 struct Loader<'a> {
     file: &'a GltfFile,
     nodes: &'a [PlacedNode<'a>],
+    max_vertices: usize,
     table: MaterialTable,
     /// Primitives read so far, by mesh and primitive: nodes share them. `None` for those without triangles.
     local_meshes: BTreeMap<(usize, usize), Option<Rc<LocalMesh>>>,
@@ -124,13 +141,13 @@ struct Loader<'a> {
 }
 
 impl<'a> Loader<'a> {
-    fn new(file: &'a GltfFile, nodes: &'a [PlacedNode<'a>]) -> Self {
+    fn new(file: &'a GltfFile, nodes: &'a [PlacedNode<'a>], max_vertices: usize) -> Self {
         let mut scene = Scene::default();
         let document = file.document();
         let used = used_materials(document, nodes);
         let table = material::read(document, file.json(), &used, &mut scene.notes);
         let (local_meshes, drafts, pointless) = Default::default();
-        Self { file, nodes, table, local_meshes, scene, drafts, pointless, skinned: 0 }
+        Self { file, nodes, max_vertices, table, local_meshes, scene, drafts, pointless, skinned: 0 }
     }
 
     fn add_object(&mut self, index: usize, placed: &PlacedNode, mesh: &gltf::Mesh) -> Result<(), Error> {
@@ -241,7 +258,8 @@ impl<'a> Loader<'a> {
                 primitive: primitive.index() as u32,
                 material,
             };
-            let degenerate = geometry::place(target, &local, &placement, self.file.name())?;
+            let degenerate =
+                geometry::place(target, &local, &placement, self.max_vertices, self.file.name())?;
             target.degenerate_triangles += degenerate;
         }
         Ok(())
@@ -268,6 +286,10 @@ impl<'a> Loader<'a> {
         if self.scene.triangles.is_empty() {
             return Err(Error::NoTriangles { file: self.file.name().to_owned(), reason: self.why_empty() });
         }
+        let extent_m = self.scene.bounds().map_or(0.0, |[low, high]| (high - low).max_element());
+        if extent_m < geometry::NARROWEST {
+            return Err(Error::TooSmall { file: self.file.name().to_owned(), extent_m });
+        }
         self.add_notes();
         self.scene.materials = self.table.materials;
         Ok((self.scene, self.table.requests, self.drafts))
@@ -275,15 +297,19 @@ impl<'a> Loader<'a> {
 
     fn why_empty(&self) -> &'static str {
         if self.scene.degenerate_triangles > 0 {
-            "none of its triangles has an area; check the scale of its nodes"
+            "none of its triangles has an area; check its positions, and the scale of its nodes"
         } else if !self.scene.volumes.is_empty() {
             "all its meshes are volumes for moving objects or authored VLMs; export the visible surfaces along with them"
         } else if !self.drafts.is_empty() {
             "all its meshes are named as authored VLMs; export the visible surfaces along with them"
         } else if !self.pointless.is_empty() {
-            "it draws points or lines only; convert them to surfaces"
+            "it draws points or lines only, or meshes without positions; convert them to surfaces"
+        } else if self.file.document().meshes().len() == 0 {
+            "it holds no mesh; check what was exported"
+        } else if self.file.document().nodes().all(|node| node.mesh().is_none()) {
+            "no node places any of its meshes; check what was exported"
         } else {
-            "the drawn scene has no mesh; check what was exported, and which scene is the file's default"
+            "none of its meshes is in the scene that is drawn; check which scene is the file's default, and which nodes are hidden"
         }
     }
 

@@ -7,6 +7,9 @@ use gltf::material::AlphaMode;
 use gltf::texture::{Info, MagFilter, WrappingMode};
 use serde_json::Value;
 
+/// The most that a surface may emit, nt: six hundred times what the sun does, and far from what single precision can hold.
+const MOST_RADIANCE: f32 = 1e12;
+
 /// The materials of a file with what must be read elsewhere for them.
 #[derive(Default)]
 pub(super) struct MaterialTable {
@@ -82,6 +85,7 @@ impl MaterialTable {
     ) {
         let ([r, g, b, alpha_factor], base_info) = base_color(source);
         let emission = Vec3::from_array(source.emissive_factor()) * source.emissive_strength().unwrap_or(1.0);
+        let emission = emission.clamp(Vec3::ZERO, Vec3::splat(MOST_RADIANCE));
         let emissive_info = source.emissive_texture().filter(|_| emission != Vec3::ZERO);
         let alpha_cutoff =
             (source.alpha_mode() == AlphaMode::Mask).then(|| source.alpha_cutoff().unwrap_or(0.5));
@@ -99,7 +103,8 @@ impl MaterialTable {
         });
         self.materials.push(Material {
             name: source.name().map_or(unnamed, str::to_owned),
-            base_color: Vec3::new(r, g, b),
+            // No surface sends back more than it gets, whatever a file says.
+            base_color: Vec3::new(r, g, b).clamp(Vec3::ZERO, Vec3::ONE),
             base_color_texture,
             emission,
             emissive_texture,

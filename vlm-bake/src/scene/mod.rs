@@ -98,6 +98,14 @@ impl Default for Steering {
     }
 }
 
+impl Steering {
+    /// What multiplies each channel of the light: intensity times tint, at most a billion, so that no product leaves single precision.
+    #[must_use]
+    pub fn strength(&self) -> Vec3 {
+        (self.tint * self.intensity).min(Vec3::splat(1e9))
+    }
+}
+
 /// A mesh that an artist made to be a VLM.
 #[derive(Clone, Debug, Default)]
 pub struct AuthoredMesh {

@@ -133,6 +133,101 @@ fn no_triangles() {
 }
 
 #[test]
+fn meshes_that_no_scene_draws() {
+    let json = Document::room().to_string();
+    let mut nowhere: serde_json::Value = serde_json::from_str(&json).unwrap();
+    nowhere["scenes"][0]["nodes"] = json!([]);
+    nowhere["nodes"] = json!([]);
+    refused("a.gltf", nowhere.to_string(), &["no node places any of its meshes", "check what was exported"]);
+    let mut elsewhere: serde_json::Value = serde_json::from_str(&json).unwrap();
+    elsewhere["scenes"][0]["nodes"] = json!([]);
+    refused(
+        "a.gltf",
+        elsewhere.to_string(),
+        &["in the scene that is drawn", "which scene is the file's default"],
+    );
+    elsewhere["meshes"] = json!([]);
+    elsewhere["nodes"] = json!([]);
+    refused("a.gltf", elsewhere.to_string(), &["it holds no mesh", "check what was exported"]);
+}
+
+#[test]
+fn triangles_too_thin_for_any_light() {
+    let mut document = Document::new();
+    document.push(
+        "wire",
+        &[[[0.0, 0.0, 0.0], [1000.0, 0.0, 0.0], [1000.0, 0.01, 0.0], [0.0, 0.01, 0.0]]],
+        Some(0),
+    );
+    refused("a.gltf", document.to_string(), &["more than 100 times as long as high", "divide them"]);
+}
+
+#[test]
+fn scenes_that_single_precision_cannot_hold() {
+    let scaled = |key: &str, value: serde_json::Value| {
+        let mut document = Document::room();
+        document.json["nodes"][0][key] = value;
+        document.to_string()
+    };
+    let far = &["/meshes/0/primitives/0", "farther than 100000000 m", "correct the mesh"];
+    refused("a.gltf", scaled("scale", json!([1e8, 1e8, 1e8])), far);
+    refused("a.gltf", scaled("translation", json!([1e30, 0, 0])), far);
+    refused("a.gltf", scaled("translation", json!([1e7, 0, 0])), &["move the scene to the origin"]);
+    refused("a.gltf", scaled("scale", json!([1e-12, 1e-12, 1e-12])), &["m wide", "glTF's unit is the metre"]);
+}
+
+#[test]
+fn authored_meshes_that_leave_nothing() {
+    let mut document = Document::room();
+    document.push(
+        "VLM_hole",
+        &[[[-9.0, -9.0, -9.0], [9.0, -9.0, -9.0], [9.0, 9.0, 9.0], [-9.0, 9.0, 9.0]]],
+        None,
+    )["extras"] = json!({ "vlm": { "mode": "subtract" } });
+    refused("a.gltf", document.to_string(), &["authored meshes take all of them away", "smaller"]);
+}
+
+#[test]
+fn more_vertices_than_allowed() {
+    let folders = Folders::new();
+    let (input, output) = (folders.input("a.gltf", Document::room().to_string()), folders.output("out.glb"));
+    let bake = |limit| {
+        run(["bake", &input, "-o", &output, "--lights", "60", "--probes", "0", "--max-vertices", limit])
+    };
+    one_error(&bake("35"), FAILED, &["a.gltf", "more than 35 vertices", "--max-vertices"]);
+    // Flat shading: the corners of twelve triangles.
+    assert!(bake("36").status.success());
+}
+
+#[test]
+fn textures_in_ktx2() {
+    let mut document = Document::room();
+    document.json["extensionsUsed"] = json!(["KHR_texture_basisu"]);
+    document.json["extensionsRequired"] = json!(["KHR_texture_basisu"]);
+    let command = "npx @gltf-transform/cli ktxdecompress";
+    refused("a.gltf", document.to_string(), &["/extensionsRequired/0", "KTX2", command]);
+}
+
+#[test]
+fn a_newer_reader_is_needed() {
+    let mut document = Document::room();
+    document.json["asset"]["minVersion"] = json!("2.1");
+    refused("a.gltf", document.to_string(), &["/asset/minVersion", "needs a reader of glTF `2.1`"]);
+}
+
+#[test]
+fn buffer_without_data() {
+    let mut document = Document::room();
+    document.json["buffers"] = json!([{ "byteLength": 1024 }]);
+    refused("a.gltf", document.to_string(), &["/buffers/0", "no uri", "1024 bytes", "BUFFER_MISSING"]);
+}
+
+#[test]
+fn glb_without_chunks() {
+    refused("a.glb", b"glTF\x02\0\0\0\x0c\0\0\0", &["promises 12 bytes, too few for a chunk", "GLB_DAMAGED"]);
+}
+
+#[test]
 fn draco() {
     let mut document = Document::room();
     document.json["extensionsUsed"] = json!(["KHR_draco_mesh_compression"]);

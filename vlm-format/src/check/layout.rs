@@ -71,10 +71,16 @@ pub(crate) fn decoded_bytes(view: &Value) -> u64 {
 
 /// Compares buffer views and accessors with `buffer_bytes`, the number of bytes that each buffer really has.
 pub(crate) fn check(root: &Value, buffer_bytes: &[u64], report: &mut Report) {
+    let promised: Vec<u64> = array(root, "/buffers")
+        .iter()
+        .map(|buffer| count(buffer, "byteLength").unwrap_or_default())
+        .collect();
     for (i, view) in array(root, "/bufferViews").iter().enumerate() {
         let pointer = format!("/bufferViews/{i}");
         match meshopt(view) {
             Some((name, codec)) => {
+                // What it decodes to need not be in the file, but has a place there: what is appended later must not fall into it.
+                check_range(view, &promised, &pointer, report);
                 let pointer = format!("{pointer}/extensions/{name}");
                 check_range(codec, buffer_bytes, &pointer, report);
                 check_codec(codec, &pointer, report);

@@ -25,6 +25,9 @@ const READABLE: &[&str] = &[
 
 const DRACO: &str = "KHR_draco_mesh_compression";
 
+/// Textures in KTX2; a file that requires it has no others.
+const KTX2: &str = "KHR_texture_basisu";
+
 /// The file must be an object and glTF 2.x.
 pub(super) fn version(root: &Value, report: &mut Report) {
     if !root.is_object() {
@@ -36,13 +39,15 @@ pub(super) fn version(root: &Value, report: &mut Report) {
     // A minVersion above 2.0 says that a reader of 2.0 must not try.
     for key in ["version", "minVersion"] {
         let Some(version) = asset.get(key).and_then(Value::as_str) else { continue };
-        let known = if key == "version" { version.starts_with("2.") } else { version == "2.0" };
+        let (known, message) = match key {
+            "version" => (version.starts_with("2."), format!("the file is glTF `{version}`, not 2.0")),
+            _ => (
+                version == "2.0",
+                format!("the file needs a reader of glTF `{version}`, and this one reads 2.0"),
+            ),
+        };
         if !known {
-            report.error(
-                Code::Version,
-                format!("/asset/{key}"),
-                format!("the file is glTF {version}, not 2.0"),
-            );
+            report.error(Code::Version, format!("/asset/{key}"), message);
         }
     }
 }
@@ -54,6 +59,12 @@ pub(super) fn extensions(root: &Value, report: &mut Report) {
         let pointer = format!("/extensionsRequired/{i}");
         if name == DRACO {
             report.error(Code::Draco, pointer, "the geometry is compressed with Draco, which is not read");
+        } else if name == KTX2 {
+            report.error(
+                Code::Ktx2,
+                pointer,
+                format!("the textures are KTX2 files (`{KTX2}`), which are not read"),
+            );
         } else if !READABLE.contains(&name) && !name.starts_with("KHR_materials_") {
             report.error(
                 Code::ExtensionUnknown,

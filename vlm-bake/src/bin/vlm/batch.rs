@@ -149,9 +149,9 @@ pub fn run(asked: &Asked, args: &BatchArgs, fail_on_violation: bool) -> Result<(
         write_json(path, &report)?;
     }
     if args.json {
-        print_json(&report)?
+        print_json(&report)?;
     } else {
-        print(&report.lines())?
+        print(&report.lines())?;
     }
     report.verdict(args, fail_on_violation)
 }

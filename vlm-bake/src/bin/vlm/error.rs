@@ -72,7 +72,7 @@ impl From<JobError> for CliError {
         match error {
             JobError::File(error) => error.into(),
             JobError::Scene(error) => error.into(),
-            JobError::Bake { .. } => Self::Check(error.to_string()),
+            JobError::Bake { .. } | JobError::Fault { .. } => Self::Check(error.to_string()),
             JobError::Cache(_) | JobError::OverSource { .. } | JobError::Unsteady { .. } => {
                 Self::Usage(error.to_string())
             }

@@ -33,6 +33,10 @@ pub struct SettingsArgs {
     /// Most near lights of a probe, whose form factor every pixel evaluates; 0 for the fastest frame [default: by preset]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=4096))]
     near: Option<u32>,
+    /// Refuse scenes with more vertices, every instance counted; a bake takes about half a kilobyte for each, several times that where
+    /// triangles share none [default: 33554432]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    max_vertices: Option<u32>,
     /// Compress the lights and the grid, without loss: a third smaller, and only readers that know this compression read them
     #[arg(long, overrides_with = "no_compress")]
     compress: bool,
@@ -126,6 +130,7 @@ impl SettingsArgs {
             probes: self.probes,
             rays: self.rays,
             near: self.near,
+            max_vertices: self.max_vertices,
             compress,
             skip: None,
         }

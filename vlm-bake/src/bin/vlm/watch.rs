@@ -170,7 +170,7 @@ impl<'a> Watch<'a> {
         let jobs = self.jobs().map_err(CliError::usage)?;
         let files = jobs.len();
         self.follow(&jobs);
-        let next = self.bake(jobs, Instant::now(), None)?;
+        let next = self.bake(&jobs, Instant::now(), None)?;
         if !self.args.json {
             eprintln!("watching  {files} files; Ctrl-C stops");
         }
@@ -212,13 +212,13 @@ impl<'a> Watch<'a> {
         self.say_gone(&jobs, change)?;
         self.follow(&jobs);
         let concerned = jobs.into_iter().filter(|job| is_of_all || concerns(change, job));
-        self.bake(concerned.collect(), change.began, Some(change))
+        self.bake(&concerned.collect::<Vec<_>>(), change.began, Some(change))
     }
 
     /// Bakes some files; what fails is only said once it stays as it is. Returns what changed meanwhile.
     fn bake(
         &mut self,
-        jobs: Vec<Job>,
+        jobs: &[Job],
         began: Instant,
         change: Option<&Change>,
     ) -> Result<Option<Change>, CliError> {
@@ -226,7 +226,7 @@ impl<'a> Watch<'a> {
             return Ok(None);
         }
         let clock = SaveClock { began, saved: saved_at(change) };
-        let (results, mut next) = self.bake_and_listen(&jobs, &clock);
+        let (results, mut next) = self.bake_and_listen(jobs, &clock);
         let failed = jobs.iter().zip(results).filter_map(|(job, result)| match result {
             Ok(()) => None,
             Err(Failure::Job(error)) => Some(Ok((job, error))),

@@ -140,7 +140,7 @@ fn vertices_beyond_single_precision_are_refused_with_their_place() {
         json!([{ "scale": [1e30, 1, 1], "children": [1] }, { "scale": [1e30, 1, 1], "mesh": 0 }]);
     let error = builder.load().unwrap_err();
     assert!(
-        matches!(&error, Error::NotFinite { pointer, .. } if pointer == "/meshes/0/primitives/0"),
+        matches!(&error, Error::TooFar { pointer, .. } if pointer == "/meshes/0/primitives/0"),
         "{error}"
     );
 }
