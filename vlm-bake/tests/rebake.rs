@@ -51,7 +51,7 @@ const EDITS: &[Edit] = &[
     (
         "normals",
         |scene, _| {
-            scene.vertex_normals.iter_mut().for_each(|n| *n = (*n + 0.1 * Vec3::X).normalize_or_zero())
+            scene.vertex_normals.iter_mut().for_each(|n| *n = (*n + 0.1 * Vec3::X).normalize_or_zero());
         },
         LIGHTS,
     ),
