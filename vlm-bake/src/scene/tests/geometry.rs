@@ -228,7 +228,7 @@ fn scenes_without_triangles_are_refused_with_the_reason() {
         builder
     };
     for (builder, expected) in
-        [(points, "points or lines"), (flat, "area"), (authored, "authored"), (empty, "no mesh")]
+        [(points, "points or lines"), (flat, "area"), (authored, "authored"), (empty, "no node places")]
     {
         let error = builder.load().unwrap_err();
         assert!(matches!(&error, Error::NoTriangles { reason, .. } if reason.contains(expected)), "{error}");
