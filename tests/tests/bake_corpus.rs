@@ -32,12 +32,12 @@ const FLAGS: [&str; 10] =
 const WORKERS: usize = 2;
 
 /// Words of advice, of which every error has one.
-const ADVICE: [&str; 15] = [
+const ADVICE: [&str; 18] = [
     "export",
     "check",
     "give",
     "Give",
-    "Ask",
+    "ask for",
     "convert",
     "decode",
     "put the",
@@ -48,6 +48,9 @@ const ADVICE: [&str; 15] = [
     "name the",
     "pass the",
     "allow",
+    "divide",
+    "move the",
+    "leave out",
 ];
 
 /// What became of a file.

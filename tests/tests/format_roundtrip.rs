@@ -219,3 +219,28 @@ fn every_container_converts_to_every_other() {
         }
     }
 }
+
+/// Found by fuzzing: a node placed its instances by an array of the extension, which stripping then took away from under it.
+#[test]
+fn what_others_use_of_the_extension_stays() {
+    let file = sample_asset::room();
+    let asset = sample_asset::quads(&file);
+    let target = Target { container: Container::Gltf { embedded: true }, file_name: String::from("a.gltf") };
+    let written = write_vlm(&file, &asset, &target).unwrap();
+    let mut json = raw(&written[0].bytes).json;
+    let positions = json["extensions"][EXTENSION]["lights"]["positions"]["accessor"].clone();
+    assert!(positions.as_u64() >= Some(2), "it is the extension's own");
+    json["nodes"][2]["extensions"]["EXT_mesh_gpu_instancing"] =
+        serde_json::json!({ "attributes": { "TRANSLATION": positions } });
+
+    let used = GltfFile::from_slice(json.to_string().as_bytes(), "a.gltf", None).unwrap();
+    let open = |outputs: Vec<OutputFile>| GltfFile::from_slice(&outputs[0].bytes, "b.gltf", None).unwrap();
+    let stripped = open(strip_vlm(&used, &target).unwrap());
+    assert_eq!(read_vlm(&stripped).unwrap(), None);
+    assert_eq!(stripped.json()["accessors"], used.json()["accessors"], "all of them stay");
+    let again = open(write_vlm(&used, &asset, &target).unwrap());
+    assert_eq!(read_vlm(&again).unwrap(), Some(asset));
+    // The negative control: without that use they go.
+    let plain = open(strip_vlm(&open(written), &target).unwrap());
+    assert_eq!(plain.json()["accessors"].as_array().map(Vec::len), Some(2));
+}

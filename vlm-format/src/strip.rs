@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::check::{array, count, index, layout};
+use crate::check::{self, array, count, index, layout};
 use crate::container::GltfFile;
 use crate::digest;
 use crate::error::Error;
@@ -88,8 +88,8 @@ pub(crate) fn source_digest(file: &GltfFile, stripped: &Parts, had_vlms: bool) -
 
 /// Removes all that writing added: extension objects, and the accessors, buffer view and data behind them. Returns the root object.
 ///
-/// What is left equals the file before writing, with one exception: where another tool appended to the file after us, the accessors and
-/// data stay, unused.
+/// What is left equals the file before writing, with one exception: where another tool appended to the file after us, or uses what we
+/// appended, the accessors and data stay.
 pub(crate) fn strip(parts: &mut Parts) -> Option<Removed> {
     let empty = parts.json.pointer(&format!("/extensions/{EXTENSION}/data/{EMPTY}"));
     let empty: BTreeSet<String> = empty.and_then(|list| BTreeSet::deserialize(list).ok()).unwrap_or_default();
@@ -160,8 +160,14 @@ fn remove_data(extension: &Value, parts: &mut Parts, empty: &BTreeSet<String>) -
     let (buffer, offset) = (index(json, "buffer")?, count(json, "byteOffset").unwrap_or(0));
     let is_tail = others.iter().all(|other| end_in(other, buffer) <= offset);
     let kept = accessors.len() - ours;
-    truncate(&mut parts.json, "accessors", kept, empty);
-    truncate(&mut parts.json, "bufferViews", view, empty);
+    let mut without = parts.json.clone();
+    truncate(&mut without, "accessors", kept, empty);
+    truncate(&mut without, "bufferViews", view, empty);
+    // Whatever else uses them, an attribute, say, would have nothing left.
+    if check::check_json(&without).has_errors() {
+        return None;
+    }
+    parts.json = without;
     let offset = usize::try_from(offset).ok()?;
     if is_tail { shrink_buffer(buffer, offset, before, parts, empty) } else { None }
 }

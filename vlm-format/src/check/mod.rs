@@ -40,7 +40,7 @@ impl Report {
     }
 
     /// True if the file has to be refused.
-    fn has_errors(&self) -> bool {
+    pub(crate) fn has_errors(&self) -> bool {
         self.issues.iter().any(|issue| issue.severity == Severity::Error)
     }
 
