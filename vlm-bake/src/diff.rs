@@ -19,7 +19,7 @@ use crate::grid_content::GridContent;
 /// lights moved that are new; lower ones call those new that moved.
 const SAME_LIGHT: f64 = 0.5;
 
-/// Reflectance of a light that differs by less is the same: the sum over its samples rounds.
+/// Reflectance and albedo of a light that differ by less are the same: sums over samples and points round.
 const SAME_REFLECTANCE: f64 = 1e-5;
 
 /// Virtual Light Meshes with what the diff needs of their file.
@@ -307,8 +307,8 @@ fn object(path: &str, id: &str, a: &[Light<'_>], b: &[Light<'_>]) -> ObjectDiff 
 }
 
 fn recoloured(a: &Light<'_>, b: &Light<'_>) -> f64 {
-    let reflectance = largest(a.reflectance() - b.reflectance());
-    largest(a.albedo - b.albedo).max(if reflectance < SAME_REFLECTANCE { 0.0 } else { reflectance })
+    let difference = largest(a.reflectance() - b.reflectance()).max(largest(a.albedo - b.albedo));
+    if difference < SAME_REFLECTANCE { 0.0 } else { difference }
 }
 
 fn largest(difference: Vec3) -> f64 {

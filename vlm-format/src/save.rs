@@ -40,7 +40,8 @@ fn remove_outdated(outputs: &[OutputFile], folder: &Path) {
     let home = main.parent().unwrap_or(Path::new(""));
     for entry in fs::read_dir(folder.join(home)).into_iter().flatten().flatten() {
         let name = entry.file_name();
-        let is_data = name.to_str().is_some_and(|name| is_data_of(stem, name));
+        let of = abandoned(&entry);
+        let is_data = of.as_deref().or(name.to_str()).is_some_and(|name| is_data_of(stem, name));
         if is_data && outputs.iter().all(|output| output.path != home.join(&name)) {
             // Nothing refers to it, so it does no harm where it cannot be removed.
             let _ = fs::remove_file(entry.path());
@@ -115,21 +116,25 @@ const ABANDONED: Duration = Duration::from_secs(3600);
 
 /// Removes temporary files that programs left which were killed while they wrote this one.
 fn remove_abandoned(path: &Path) {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = path.file_name().unwrap_or_default();
     let Some(folder) = path.parent() else { return };
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-        let found = entry.file_name();
-        let id = found.to_str().and_then(|found| {
-            let rest = found.strip_prefix('.')?.strip_prefix(&*name)?.strip_prefix('.')?;
-            rest.strip_suffix(".tmp")?.split_once('-')?.0.parse::<u32>().ok()
-        });
-        let age = || entry.metadata().ok()?.modified().ok()?.elapsed().ok();
-        if id.is_some_and(|id| is_gone(id) || age().is_some_and(|age| age > ABANDONED)) {
+        if abandoned(&entry).is_some_and(|of| OsStr::new(&of) == name) {
             // Somebody else may have been faster.
             let _ = fs::remove_file(entry.path());
         }
     }
+}
+
+/// The name of the file that a temporary one was to become, if nobody writes it any more.
+fn abandoned(entry: &fs::DirEntry) -> Option<String> {
+    let name = entry.file_name();
+    let (of, writer) = name.to_str()?.strip_prefix('.')?.strip_suffix(".tmp")?.rsplit_once('.')?;
+    let process: u32 = writer.split_once('-')?.0.parse().ok()?;
+    let age = || entry.metadata().ok()?.modified().ok()?.elapsed().ok();
+    let is_abandoned = is_gone(process) || age().is_some_and(|age| age > ABANDONED);
+    is_abandoned.then(|| of.to_owned())
 }
 
 /// True if this machine tells which processes run, and the one of this id does not.
