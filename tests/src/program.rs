@@ -1,7 +1,7 @@
 //! The program `vlm`, for tests that run it as a user does.
 
 use std::path::PathBuf;
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 /// Builds `vlm` in the profile of this test, where it is not there or old, and returns its path.
 ///
@@ -15,10 +15,13 @@ pub fn vlm() -> PathBuf {
     let test = std::env::current_exe().unwrap_or_default();
     let folder = test.ancestors().nth(2).map(PathBuf::from).unwrap_or_default();
     let profile = folder.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let profile = if profile == "debug" { "dev" } else { &profile };
-    // With all packages, since their features decide how those that they share are built.
+    let profile = if profile == "debug" { vec![] } else { vec!["--profile", profile.as_str()] };
+    // A test of the program's own package needs it; built as tests are, it shares all that these share.
     let built = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-        .args(["build", "--quiet", "--workspace", "--locked", "--bin", "vlm", "--profile", profile])
+        .args(["test", "--quiet", "--workspace", "--locked", "--no-run", "--test", "cli"])
+        .args(profile)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .status();
     assert!(built.is_ok_and(|status| status.success()), "vlm cannot be built");
