@@ -9,6 +9,7 @@ use serde_json::Value;
 use vlm_format::{
     Container, EXTENSION, GltfFile, OutputFile, Target, read_vlm, strip_vlm, write_atomic, write_vlm,
 };
+use vlm_tests::glb::{Glb, Mesh, container};
 use vlm_tests::{assets, sample_asset};
 
 /// GLB, side files, data URIs; quantised, compressed and sparse data; instances, unknown extensions, extras, skins.
@@ -243,4 +244,32 @@ fn what_others_use_of_the_extension_stays() {
     // The negative control: without that use they go.
     let plain = open(strip_vlm(&open(written), &target).unwrap());
     assert_eq!(plain.json()["accessors"].as_array().map(Vec::len), Some(2));
+}
+
+/// Found by fuzzing: stripping shortened the buffer to a wrong length, and views of others then reached past it.
+#[test]
+fn a_wrong_length_from_before_writing_is_not_believed() {
+    let mut glb = Glb::new(serde_json::json!({ "asset": { "version": "2.0" } }));
+    let triangle = Mesh {
+        positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+        normals: vec![[0.0, 0.0, 1.0]; 3],
+        indices: vec![0, 1, 2],
+    };
+    let primitive = glb.primitive(&triangle, 0);
+    glb.json["materials"] = serde_json::json!([{}]);
+    glb.json["meshes"] = serde_json::json!([{ "primitives": [primitive] }]);
+    glb.json["nodes"] = serde_json::json!([{ "mesh": 0 }]);
+    let file = GltfFile::from_slice(&glb.finish(), "a.glb", None).unwrap();
+    let target = Target { container: Container::Glb, file_name: String::from("a.glb") };
+    let written = write_vlm(&file, &sample_asset::quads(&file), &target).unwrap();
+    let Raw { mut json, bin } = raw(&written[0].bytes);
+    let before = json["extensions"][EXTENSION]["data"]["bufferByteLength"].as_u64().unwrap();
+    for (length, is_right) in [(before, true), (before - 8, false), (before + 8, false)] {
+        json["extensions"][EXTENSION]["data"]["bufferByteLength"] = length.into();
+        let told = GltfFile::from_slice(&container(&json, &bin), "b.glb", None).unwrap();
+        let stripped = strip_vlm(&told, &target).unwrap();
+        let stripped = GltfFile::from_slice(&stripped[0].bytes, "c.glb", None).unwrap();
+        let left = stripped.json()["buffers"][0]["byteLength"].as_u64().unwrap();
+        assert_eq!(left == before, is_right, "{left} bytes for {length}");
+    }
 }

@@ -142,7 +142,7 @@ impl NodeSpace {
 }
 
 /// True if a light survives the way into the file: its node's transform has an inverse, and in the node's space, in single
-/// precision, it is no thinner than a light may be.
+/// precision, it is no thinner than a light may be, nor once that is back in the world.
 #[must_use]
 pub fn placeable(scene: &Scene, light: &BakedLight) -> bool {
     let world_from_node = scene.objects[light.object as usize].world_from_node;
@@ -150,5 +150,7 @@ pub fn placeable(scene: &Scene, light: &BakedLight) -> bool {
     let stored = light.corners.map(|p| to_node.point(p));
     world_from_node.determinant() != 0.0
         && stored.iter().all(|p| p.is_finite())
-        && aspect_ratio(stored.map(|p| p.as_dvec3())).max(aspect_ratio(light.corners)) <= MAX_ASPECT
+        && [stored.map(|p| p.as_dvec3()), light.corners, as_stored(world_from_node, light.corners)]
+            .into_iter()
+            .all(|corners| aspect_ratio(corners) <= MAX_ASPECT)
 }

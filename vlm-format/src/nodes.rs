@@ -69,12 +69,26 @@ impl GltfFile {
 /// The node's own transform.
 fn parent_from_node(node: &Value) -> DMat4 {
     if let Some(matrix) = numbers::<16>(node, "matrix") {
-        return DMat4::from_cols_array(&matrix);
+        return affine(DMat4::from_cols_array(&matrix));
     }
     let translation = numbers(node, "translation").map_or(DVec3::ZERO, DVec3::from_array);
     let rotation = numbers(node, "rotation").map_or(DQuat::IDENTITY, DQuat::from_array);
     let scale = numbers(node, "scale").map_or(DVec3::ONE, DVec3::from_array);
     DMat4::from_scale_rotation_translation(scale, unit_quaternion(rotation), translation)
+}
+
+/// Without what would project: the last row of a node's matrix is 0, 0, 0, 1 (glTF 2.0 specification, section 3.5.3), and points are
+/// placed by the rest, so its inverse has to be that of the rest, too.
+fn affine(mut matrix: DMat4) -> DMat4 {
+    for (column, w) in [
+        (&mut matrix.x_axis, 0.0),
+        (&mut matrix.y_axis, 0.0),
+        (&mut matrix.z_axis, 0.0),
+        (&mut matrix.w_axis, 1.0),
+    ] {
+        column.w = w;
+    }
+    matrix
 }
 
 /// The rotation, of unit length; no rotation for 0.
@@ -103,5 +117,24 @@ mod tests {
         assert!((world[1].w_axis.truncate() - DVec3::new(0.0, 3.0, 0.0)).length() < 1e-12, "{world:?}");
         let long = DMat4::from_quat(DQuat::from_xyzw(0.0, 0.0, 0.709, 0.709));
         assert!((long.transform_vector3(DVec3::X) - DVec3::Y).length() > 1e-3, "as the file has it");
+    }
+
+    /// Found by fuzzing: lights were placed by the inverse of a matrix that projects, and so elsewhere than their surface.
+    #[test]
+    fn matrices_that_project_count_without_that() {
+        let json =
+            r#"{"asset":{"version":"2.0"},"nodes":[{"matrix":[2,0,0,0.5, 0,1,0,-3, 0,0,1,7, 4,5,6,0.1]}]}"#;
+        let file = GltfFile::from_slice(json.as_bytes(), "a.gltf", None).unwrap();
+        let world_from_node = file.world_from_nodes()[0];
+        let place = DVec3::new(1.0, 2.0, 3.0);
+        let placed = world_from_node.transform_point3(place);
+        assert_eq!(placed, DVec3::new(6.0, 7.0, 9.0));
+        assert!((world_from_node.inverse().transform_point3(placed) - place).length() < 1e-12);
+        let as_it_stands =
+            DMat4::from_cols_array(&numbers::<16>(&file.json()["nodes"][0], "matrix").unwrap());
+        assert!(
+            (as_it_stands.inverse().transform_point3(placed) - place).length() > 0.1,
+            "the negative control"
+        );
     }
 }

@@ -158,7 +158,9 @@ fn remove_data(extension: &Value, parts: &mut Parts, empty: &BTreeSet<String>) -
         return None;
     }
     let (buffer, offset) = (index(json, "buffer")?, count(json, "byteOffset").unwrap_or(0));
-    let is_tail = others.iter().all(|other| end_in(other, buffer) <= offset);
+    let needed = others.iter().map(|other| end_in(other, buffer)).max().unwrap_or(0);
+    // A length that does not suit the rest is no length from before writing.
+    let is_tail = needed <= before && before <= offset;
     let kept = accessors.len() - ours;
     let mut without = parts.json.clone();
     truncate(&mut without, "accessors", kept, empty);
