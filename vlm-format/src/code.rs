@@ -135,7 +135,9 @@ mod tests {
     fn names_are_unique_and_in_capitals() {
         let mut names: Vec<_> = Code::ALL.iter().map(|code| code.as_str()).collect();
         assert!(
-            names.iter().all(|name| name.bytes().all(|b| b.is_ascii_uppercase() || b == b'_')),
+            names
+                .iter()
+                .all(|name| name.bytes().all(|b| b.is_ascii_uppercase() || b.is_ascii_digit() || b == b'_')),
             "{names:?}"
         );
         names.sort_unstable();
