@@ -91,6 +91,6 @@ fn data_of_a_former_output_goes_and_nothing_else() {
         fs::write(folder.path().join(name), "data").unwrap();
     }
     write_atomic(&[output("a.gltf", "json"), output(&data("2"), "new")], folder.path()).unwrap();
-    let left = ["a.bin", "a.gltf", &data("2"), "a.vlm.12.bin", "a.vlm.bin", "b.vlm.1111111111111111.bin"];
+    let left = ["a.bin", "a.gltf", "a.vlm.12.bin", &data("2"), "a.vlm.bin", "b.vlm.1111111111111111.bin"];
     assert_eq!(names(folder.path()), left);
 }
