@@ -34,6 +34,9 @@ const OUT: f32 = 0.99;
 /// A reach is never below this share of what it would be in the open.
 const LEAST: f32 = 0.02;
 
+/// What is left of a wall's normal across that of the surface tells a direction if it is longer; else it is rounding, and lies anywhere.
+const LEAST_ACROSS: f32 = 1e-3;
+
 /// The probes at the chosen places, their rows still empty.
 #[must_use]
 pub fn probes(trace: &TraceScene, pool: &[Place], spacing: &Spacing, chosen: &[u32]) -> Vec<Probe> {
@@ -51,12 +54,7 @@ fn probe(trace: &TraceScene, place: &Place, reach: f32) -> Probe {
     let up = free(trace, surface.position, surface.geometric_normal, height);
     let down = free(trace, surface.position, -surface.geometric_normal, height);
     let walls = walls(trace, place, reach, up);
-    let tangent = walls.first().map_or_else(
-        || normal.any_orthonormal_vector(),
-        |wall| {
-            wall.facing.reject_from(normal).try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector())
-        },
-    );
+    let tangent = tangent(normal, walls.first().map(|wall| wall.facing));
     let bitangent = normal.cross(tangent);
     let mut sides = [reach; 4];
     for wall in &walls {
@@ -81,6 +79,13 @@ fn probe(trace: &TraceScene, place: &Place, reach: f32) -> Probe {
         reach_down: along_normal(down, fall),
         reach: sides.map(|side| side.max(least)),
     }
+}
+
+/// A unit vector across the normal, along the normal of the nearest wall if that tells one.
+fn tangent(normal: Vec3, facing: Option<Vec3>) -> Vec3 {
+    let across = facing.map(|facing| facing.reject_from(normal));
+    let across = across.filter(|across| across.length_squared() > LEAST_ACROSS * LEAST_ACROSS);
+    across.and_then(Vec3::try_normalize).unwrap_or_else(|| normal.any_orthonormal_vector())
 }
 
 /// What stands in a probe's way along its surface.
@@ -115,4 +120,24 @@ fn walls(trace: &TraceScene, place: &Place, reach: f32, up: f32) -> Vec<Wall> {
 fn free(trace: &TraceScene, position: Vec3, direction: Vec3, most: f32) -> f32 {
     let origin = trace.bvh.leave(position, direction);
     trace.path_hit_within(origin, direction, most).map_or(most, |hit| hit.distance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Found by fuzzing: what rounding left of a normal was taken for a direction.
+    #[test]
+    fn a_wall_that_faces_along_the_normal_tells_no_tangent() {
+        let normal = Vec3::new(0.36, 0.48, 0.8).normalize_or_zero();
+        for turned in [0.0, 1e-7, 3e-7, 1e-5, 1e-3, 0.1, 1.0] {
+            let facing = (Vec3::new(turned, 0.0, 0.0) - normal).normalize_or_zero();
+            let tangent = tangent(normal, Some(facing));
+            let off = tangent.dot(normal).abs();
+            assert!(off < 1e-4 && (tangent.length() - 1.0).abs() < 1e-5, "{turned}: {off}");
+        }
+        let nearly = (Vec3::new(1e-7, 3e-7, 0.0) - normal).normalize_or_zero();
+        let rounding = nearly.reject_from(normal).normalize_or_zero();
+        assert!(rounding.dot(normal).abs() > 1e-3, "the negative control: {rounding}");
+    }
 }
